@@ -1,0 +1,1 @@
+"""Fractional operators and the linear fractional equation as data."""

@@ -1,0 +1,37 @@
+"""Scales that lead from dimensionless quantities to SI units."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+EARTH_GRAVITATIONAL_PARAMETER_KM3_S2 = 398600.4418
+"""Geocentric gravitational constant GM, IERS Conventions (2010), Table 1.1."""
+
+
+@dataclass(frozen=True)
+class Scales:
+    """Length and time that correspond to 1 in dimensionless equations.
+
+    ``position[m] = length_m * position``, ``time[s] = time_s * time``.
+    """
+
+    length_m: float
+    """Length unit in metres."""
+    time_s: float
+    """Time unit in seconds."""
+
+    @property
+    def speed_m_s(self) -> float:
+        """Speed unit in m/s."""
+        return self.length_m / self.time_s
+
+    @property
+    def acceleration_m_s2(self) -> float:
+        """Acceleration unit in m/s²."""
+        return self.length_m / self.time_s**2
+
+    @property
+    def period_s(self) -> float:
+        """Seconds in 2π units of dimensionless time, one orbit of the chief."""
+        return 2.0 * math.pi * self.time_s
