@@ -1,0 +1,120 @@
+"""The rooms of the package and what each may import: downwards only."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(__file__).parents[1] / "fracctl"
+
+BOTTOM_UP = (
+    "errors",
+    "units",
+    "arrays",
+    "fractional",
+    "plants",
+    "controllers",
+    "loop",
+    "characteristic",
+    "panels",
+    "trajectory",
+    "solvers",
+    "stability",
+    "design",
+    "measures",
+    "evaluation",
+    "surveys",
+    "store",
+    "config",
+    "figures",
+    "report",
+    "execution",
+    "cli",
+)
+"""Figures and the report read the store only; a run in `execution` draws them at its end."""
+
+LONGEST_MODULE = 350
+HYDRA_MODULE = "config/compose.py"
+
+MODULES = sorted(PACKAGE.rglob("*.py"))
+
+
+def imported_names(tree: ast.AST) -> Iterator[tuple[int, str]]:
+    """Line and dotted name of everything imported anywhere in a module, inside functions too."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from ((node.lineno, alias.name) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"line {node.lineno}: relative import"
+            yield from ((node.lineno, f"{node.module}.{alias.name}") for alias in node.names)
+
+
+def room(dotted: str) -> str | None:
+    """`fracctl.solvers.contour` lies in `solvers`; the package itself and other packages lie in none."""
+    parts = dotted.split(".")
+    return parts[1] if parts[0] == "fracctl" and len(parts) > 1 and parts[1] in existing_rooms() else None
+
+
+def existing_rooms() -> set[str]:
+    folders = {path.parent.relative_to(PACKAGE).parts[0] for path in MODULES if path.parent != PACKAGE}
+    return folders | {path.stem for path in PACKAGE.glob("*.py")} - {"__init__", "__main__"}
+
+
+def upward_imports(source: str, own_room: str) -> list[str]:
+    height = BOTTOM_UP.index(own_room)
+    found = []
+    for line, name in imported_names(ast.parse(source)):
+        other = room(name)
+        if other is not None and BOTTOM_UP.index(other) > height:
+            found.append(f"line {line}: {own_room} imports {name}, which lies above it")
+        if name == "fracctl" or (name.startswith("fracctl.") and other is None):
+            found.append(f"line {line}: {own_room} imports from the package itself ({name}); name the module")
+    return found
+
+
+def test_every_room_has_its_place() -> None:
+    assert existing_rooms() <= set(BOTTOM_UP), "a new room needs a place in BOTTOM_UP and in DESIGN"
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(PACKAGE)))
+def test_imports_point_downwards(path: Path) -> None:
+    relative = path.relative_to(PACKAGE)
+    if str(relative) in ("__init__.py", "__main__.py"):
+        pytest.skip("the front door sees all rooms")
+    assert upward_imports(path.read_text(encoding="utf-8"), relative.parts[0].removesuffix(".py")) == []
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(PACKAGE)))
+def test_only_one_module_touches_hydra(path: Path) -> None:
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    lines = [line for line, name in imported_names(tree) if name.split(".")[0] == "hydra"]
+    assert lines == [] or path == PACKAGE / HYDRA_MODULE
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(PACKAGE)))
+def test_modules_stay_short(path: Path) -> None:
+    assert len(path.read_text(encoding="utf-8").splitlines()) <= LONGEST_MODULE
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "from fracctl.loop import ClosedLoop",
+        "import fracctl.loop",
+        "from fracctl import loop",
+        "from fracctl import ClosedLoop",
+        "import fracctl",
+        "def f():\n    from fracctl.loop import ClosedLoop",
+        "if TYPE_CHECKING:\n    from fracctl.loop import ClosedLoop",
+    ],
+)
+def test_an_upward_import_is_seen(line: str) -> None:
+    assert upward_imports(line, "fractional") != []
+
+
+@pytest.mark.parametrize("line", ["from fracctl.arrays import Floats", "from fracctl import errors", "import numpy"])
+def test_a_downward_import_is_allowed(line: str) -> None:
+    assert upward_imports(line, "fractional") == []

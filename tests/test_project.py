@@ -1,0 +1,108 @@
+"""The repository as a stranger meets it: what is built, what is promised, what must not be there."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import tomllib
+import zipfile
+from pathlib import Path
+
+import pytest
+from hatchling.builders.wheel import WheelBuilder
+
+ROOT = Path(__file__).parents[1]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+
+MACHINE_PATHS = r"(?<![\w.~$}])/(?:" + "|".join(["work", "home", "root", "Users", "opt", "mnt"]) + r")/\w"
+INDEX_ADDRESSES = "|".join(
+    ["pypi" + r"\.org", "python" + r"hosted\.org", "index" + "[-_]url", "find" + "[-_]links", r"/" + r"simple\b"]
+)
+
+
+def tracked_files() -> list[Path]:
+    listing = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=False)
+    if listing.returncode != 0:
+        pytest.skip("not a git checkout")
+    return [ROOT / name for name in listing.stdout.split("\0") if name]
+
+
+def tracked_text() -> list[tuple[str, str]]:
+    texts = [path for path in tracked_files() if path.is_file() and b"\0" not in path.read_bytes()[:8000]]
+    return [(str(path.relative_to(ROOT)), path.read_text(encoding="utf-8")) for path in texts]
+
+
+def make_targets() -> set[str]:
+    text = (ROOT / "Makefile").read_text(encoding="utf-8")
+    (phony,) = re.findall(r"^\.PHONY: (.*)$", text, flags=re.MULTILINE)
+    targets = set(phony.split())
+    assert targets == {target for target in targets if re.search(rf"^{target}:", text, flags=re.MULTILINE)}
+    return targets
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> zipfile.ZipFile:
+    folder = tmp_path_factory.mktemp("wheel")
+    (path,) = WheelBuilder(str(ROOT)).build(directory=str(folder), versions=["standard"])
+    return zipfile.ZipFile(path)
+
+
+@pytest.mark.parametrize("pattern", [MACHINE_PATHS, INDEX_ADDRESSES], ids=["machine paths", "package-index addresses"])
+def test_nothing_tracked_belongs_to_one_machine(pattern: str) -> None:
+    texts = tracked_text()
+    assert texts
+    assert [f"{name}: {hit[0]}" for name, text in texts for hit in re.finditer(pattern, text)] == []
+
+
+def test_the_patterns_see_what_they_look_for() -> None:
+    for text in ("open('/" + "home/me/x')", "cd /" + "work/main", "see /" + "root/x"):
+        assert re.search(MACHINE_PATHS, text)
+    for text in ("https://" + "pypi" + ".org/project/x", "pip install --" + "index-url=x"):
+        assert re.search(INDEX_ADDRESSES, text)
+
+
+def test_wheel_holds_configuration_and_types(wheel: zipfile.ZipFile) -> None:
+    names = set(wheel.namelist())
+    expected = {f"fracctl/{path.relative_to(ROOT)}" for path in (ROOT / "conf").rglob("*.yaml")}
+    assert expected
+    assert expected <= names
+    assert "fracctl/py.typed" in names
+    assert not [name for name in names if name.startswith("tests/")]
+
+
+def test_wheel_holds_every_module(wheel: zipfile.ZipFile) -> None:
+    expected = {str(path.relative_to(ROOT)) for path in (ROOT / "fracctl").rglob("*.py")}
+    assert expected <= set(wheel.namelist())
+
+
+def test_wheel_declares_what_the_project_declares(wheel: zipfile.ZipFile) -> None:
+    (metadata,) = [wheel.read(name).decode() for name in wheel.namelist() if name.endswith("METADATA")]
+    assert f"Version: {PROJECT['version']}\n" in metadata
+    assert "License-Expression: BSD-3-Clause\n" in metadata
+    assert "fracctl = fracctl.cli.main:main" in "".join(
+        wheel.read(name).decode() for name in wheel.namelist() if name.endswith("entry_points.txt")
+    )
+
+
+def test_changelog_follows_its_form() -> None:
+    text = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    sections = re.findall(r"^## (.*)$", text, flags=re.MULTILINE)
+    assert sections[0] == "[Unreleased]"
+    assert all(re.fullmatch(r"\[\d+\.\d+\.\d+\] - \d{4}-\d{2}-\d{2}", section) for section in sections[1:])
+    kinds = set(re.findall(r"^### (.*)$", text, flags=re.MULTILINE))
+    assert kinds <= {"Added", "Changed", "Deprecated", "Removed", "Fixed", "Security"}
+
+
+def test_documents_name_targets_that_exist() -> None:
+    targets = make_targets()
+    for name in ("README.md", "CONTRIBUTING.md", ".ci/run"):
+        text = (ROOT / name).read_text(encoding="utf-8")
+        mentioned = set(re.findall(r"(?:^|`)make (?:[A-Z]+=\S+ )?([a-z-]+)", text, flags=re.MULTILINE))
+        assert mentioned <= targets, name
+
+
+def test_documents_name_files_that_exist() -> None:
+    for name in ("README.md", "CONTRIBUTING.md"):
+        text = (ROOT / name).read_text(encoding="utf-8")
+        links = [link for link in re.findall(r"\]\(([^)#]+)\)", text) if "://" not in link]
+        assert [link for link in links if not (ROOT / link).exists()] == [], name
