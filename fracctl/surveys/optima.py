@@ -1,0 +1,106 @@
+"""The optima of a survey: the best point of every slice, of all, and of the baseline."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from fracctl.arrays import Booleans
+from fracctl.surveys.base import Rows
+
+KINDS = ("overall", "baseline", "slice")
+
+_Key = tuple[float, ...]
+_Place = tuple[str, str, str, float | None]
+
+
+class Optima:
+    """Selects optima from rows that come part by part; holds the best rows only.
+
+    A candidate has status ``ok``, is not known to be unstable, and has a finite objective. A combined objective needs
+    a control effort other than 0. Ties go to the smallest control effort, then to the lexicographically smallest
+    design variables.
+
+    Args:
+        objectives: measure columns by name of the objective; its values are the column ``objective_<name>``.
+        design_variables: their columns, in the order of the tables.
+        slice: the design variable for each value of which an optimum is selected.
+        baseline: values of design variables that the points of kind ``baseline`` have.
+    """
+
+    def __init__(
+        self,
+        objectives: Mapping[str, Sequence[str]],
+        design_variables: Sequence[str],
+        slice: str | None = None,  # noqa: A002 - the name in the configuration
+        baseline: Mapping[str, float] | None = None,
+    ) -> None:
+        self._objectives = objectives
+        self._design_variables = tuple(design_variables)
+        self._slice = slice
+        self._baseline = dict(baseline or {})
+        self._initial_conditions: list[str] = []
+        self._best: dict[_Place, tuple[_Key, dict[str, Any]]] = {}
+
+    def add(self, rows: Rows) -> None:
+        """Take further rows into account."""
+        names = rows["initial_condition"]
+        for name in dict.fromkeys(names.tolist()):
+            if name not in self._initial_conditions:
+                self._initial_conditions.append(name)
+            for objective in self._objectives:
+                self._add(rows, objective, name, self._candidates(rows, objective) & (names == name))
+
+    def rows(self) -> list[dict[str, Any]]:
+        """Return the optima: `kind`, `slice`, `objective_name`, then the columns of the rows.
+
+        Sorted by objective and initial condition as they were given, then overall, baseline, slices ascending.
+        """
+        return [
+            {"kind": kind, "slice": value, "objective_name": objective, **row}
+            for objective in self._objectives
+            for name in self._initial_conditions
+            for kind in KINDS
+            for value, row in self._of(objective, name, kind)
+        ]
+
+    def _of(self, objective: str, name: str, kind: str) -> Iterator[tuple[float | None, dict[str, Any]]]:
+        found = [(key[3], row) for key, (_, row) in self._best.items() if key[:3] == (objective, name, kind)]
+        yield from sorted(found, key=lambda item: item[0] or 0.0)
+
+    def _candidates(self, rows: Rows, objective: str) -> Booleans:
+        unstable = np.equal(np.asarray(rows["stable"], dtype=object), False)
+        allowed: Booleans = (rows["status"] == "ok") & ~unstable & np.isfinite(rows[f"objective_{objective}"])
+        if len(self._objectives[objective]) > 1 and "control_effort" in rows:
+            allowed &= rows["control_effort"] != 0.0
+        return allowed
+
+    def _add(self, rows: Rows, objective: str, name: str, allowed: Booleans) -> None:
+        self._offer(rows, allowed, (objective, name, "overall", None))
+        if self._baseline:
+            matching = np.logical_and.reduce([rows[column] == value for column, value in self._baseline.items()])
+            self._offer(rows, allowed & matching, (objective, name, "baseline", None))
+        if self._slice is not None:
+            for value in np.unique(rows[self._slice][allowed]).tolist():
+                self._offer(rows, allowed & (rows[self._slice] == value), (objective, name, "slice", value))
+
+    def _offer(self, rows: Rows, allowed: Booleans, place: _Place) -> None:
+        (where,) = np.nonzero(allowed)
+        if not where.size:
+            return
+        values = rows[f"objective_{place[0]}"][where]
+        key, best = min((self._key(rows, place[0], row), row) for row in where[values == values.min()].tolist())
+        if place not in self._best or key < self._best[place][0]:
+            self._best[place] = (key, {column: _scalar(array[best]) for column, array in rows.items()})
+
+    def _key(self, rows: Rows, objective: str, row: int) -> _Key:
+        effort = float(rows["control_effort"][row]) if "control_effort" in rows else 0.0
+        design = (float(rows[column][row]) for column in self._design_variables)
+        return (float(rows[f"objective_{objective}"][row]), math.inf if math.isnan(effort) else effort, *design)
+
+
+def _scalar(value: Any) -> Any:
+    return value.item() if isinstance(value, np.generic) else value
