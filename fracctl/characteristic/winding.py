@@ -1,0 +1,129 @@
+"""The number of poles right of a line, by the argument principle.
+
+det M̃ is followed along a path that closes in the upper right quarter: from a real point beyond all zeros along an
+arc to the line Re σ = a, down the line, and by a small arc around the branch point back to the real axis. By the
+symmetry of det M̃ about the real axis, the number of zeros to the right is the change of phase over π.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fracctl.arrays import Booleans, Complexes, Floats
+from fracctl.characteristic.bounds import pole_radius
+from fracctl.characteristic.matrix import CharacteristicMatrix
+
+_INNER = 1e-5
+"""Radius of the arc around the branch point; zeros on the real axis inside it are found by the sign at 0."""
+_RATIO = 1.2
+_SMALLEST_STEP = 1e-13
+"""Relative length at which an interval of the path is given up: the phase turns on the line itself."""
+
+
+def unstable_zeros(matrix: CharacteristicMatrix) -> tuple[Floats, Booleans]:
+    """Count the zeros of det M̃ with Re σ > 0.
+
+    Args:
+        matrix: the characteristic matrix of a batch of b loops.
+
+    Returns:
+        The counts (b,), NaN where a zero lies on the imaginary axis to rounding, and whether (b,) the loop is
+        marginal in that sense.
+    """
+    outer = 2.0 * float(np.max(pole_radius(matrix)))
+    n_line = 2 + int(np.log(outer / _INNER) / np.log(_RATIO))
+    line = 1j * np.geomspace(outer, _INNER, n_line)
+    arc = _INNER * np.exp(1j * np.linspace(np.pi / 2, 0.0, 6 * matrix.size + 6))[1:]
+    arc[-1] = _INNER
+    path = np.concatenate([line, arc])
+    turns, resolved = _turns(matrix, path)
+    zeros, marginal = _at_origin(matrix, turns)
+    marginal |= ~resolved
+    return np.where(marginal, np.nan, zeros), marginal
+
+
+def abscissa_bound(matrix: CharacteristicMatrix, resolution: float) -> Floats:
+    """Return a (b,), a bound on the real parts of all poles that exceeds the largest by at most `resolution`.
+
+    Meant for loops with a pole in the right half plane; bisection on the number of zeros right of Re σ = a.
+    """
+    upper = pole_radius(matrix)
+    lower = np.zeros_like(upper)
+    while np.max(upper - lower) > resolution:
+        middle = 0.5 * (lower + upper)
+        none = _none_right_of(matrix, middle, 2.0 * pole_radius(matrix))
+        upper, lower = np.where(none, middle, upper), np.where(none, lower, middle)
+    return upper
+
+
+def _none_right_of(matrix: CharacteristicMatrix, abscissa: Floats, outer: Floats) -> Booleans:
+    heights = np.linspace(1.0, 0.0, 400) ** 2 * outer[:, None]
+    values = matrix.determinant(abscissa[:, None] + 1j * heights)
+    turns, ambiguous = _crossings(values)
+    clear: Booleans = (turns == 0.0) & ~ambiguous.any(axis=1) & (values[:, -1].real > 0.0)
+    return clear
+
+
+def _turns(matrix: CharacteristicMatrix, path: Complexes) -> tuple[Floats, Booleans]:
+    """Return phase change over 2π along `path` (b,), and whether every step of it was resolved."""
+    values = matrix.determinant(path)
+    turns, ambiguous = _crossings(values)
+    resolved = np.ones(len(turns), dtype=bool)
+    rows, steps = np.nonzero(ambiguous)
+    left, right = path[steps], path[steps + 1]
+    left_value, right_value = values[rows, steps], values[rows, steps + 1]
+    while rows.size:
+        middle = _between(left, right)
+        value = matrix.take(rows).determinant(middle[:, None])[:, 0]
+        stuck = np.abs(right - left) < _SMALLEST_STEP * np.abs(middle)
+        resolved[rows[stuck]] = False
+        halves = [(left, left_value, middle, value), (middle, value, right, right_value)]
+        pending = []
+        for a, value_a, b, value_b in halves:
+            turn, open_ = _crossings(np.stack([value_a, value_b], axis=1))
+            np.add.at(turns, rows, turn)
+            again = open_[:, 0] & ~stuck
+            pending.append((rows[again], a[again], b[again], value_a[again], value_b[again]))
+        rows, left, right, left_value, right_value = (np.concatenate(part) for part in zip(*pending, strict=True))
+    end = values[:, -1].real < 0.0
+    return turns + 0.5 * end, resolved
+
+
+def _between(left: Complexes, right: Complexes) -> Complexes:
+    """Midpoint along the line or the arc that joins two neighbours of the path."""
+    radius = np.sqrt(np.abs(left) * np.abs(right))
+    return radius * np.exp(0.5j * (np.angle(left) + np.angle(right)))
+
+
+def _crossings(values: Complexes) -> tuple[Floats, Booleans]:
+    """Count crossings of the negative real axis, counter-clockwise ones as +1, along (b, k).
+
+    A step that moves by two quadrants is ambiguous: it is marked in (b, k - 1) and not counted.
+    """
+    below, left = values.imag < 0.0, values.real < 0.0
+    turned, swung = below[:, 1:] != below[:, :-1], left[:, 1:] != left[:, :-1]
+    ambiguous = turned & swung
+    crossed = turned & left[:, 1:] & ~ambiguous
+    downward = below[:, 1:]
+    turns: Floats = (crossed & downward).sum(axis=1) - (crossed & ~downward).sum(axis=1).astype(np.float64)
+    return turns, ambiguous
+
+
+def _at_origin(matrix: CharacteristicMatrix, turns: Floats) -> tuple[Floats, Booleans]:
+    """Complete the count by the zeros in (0, inner radius); mark loops with a zero at the origin itself.
+
+    Where no order is negative det M(0) is finite, and a sign of it that differs from the sign at the inner radius
+    tells of an odd number of real zeros between.
+    """
+    zeros = 2.0 * turns
+    terms = matrix.system.dynamics
+    if any(np.any(term.orders < 0.0) for term in terms):
+        return zeros, np.zeros(len(zeros), dtype=bool)
+    static = np.zeros((matrix.batch, matrix.size, matrix.size))
+    for term in terms:
+        static = static + term.matrix * (term.orders == 0.0)[..., None, :]
+    at_zero = np.linalg.det(static)
+    scale = np.prod(np.maximum(np.abs(static).sum(axis=-1), 1e-300), axis=-1)
+    inner = matrix.determinant(np.array([_INNER + 0j]))[:, 0].real
+    zeros = zeros + (np.sign(at_zero) * np.sign(inner) < 0)
+    return zeros, np.abs(at_zero) <= 1e-13 * np.maximum(scale, 1.0)
