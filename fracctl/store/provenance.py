@@ -1,0 +1,46 @@
+"""Where a run comes from: versions, commit, machine."""
+
+from __future__ import annotations
+
+import os
+import platform
+import subprocess
+from collections.abc import Mapping
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any
+
+from fracctl.store.identity import PACKAGE, sources_digest
+
+_LIBRARIES = ("fracctl", "numpy", "scipy", "pandas", "pyarrow")
+
+
+def provenance(configuration: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what does not change while the run is computed, as plain data."""
+    return {
+        "versions": {"python": platform.python_version()} | {name: _version(name) for name in _LIBRARIES},
+        "commit": _commit(),
+        "sources": sources_digest(),
+        "platform": platform.platform(),
+        "processor": platform.machine(),
+        "cores": os.cpu_count(),
+        "seed": configuration.get("seed"),
+    }
+
+
+def _version(name: str) -> str | None:
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return None
+
+
+def _commit() -> str | None:
+    """Commit of the checkout that the package lies in, with ``-dirty`` where files differ from it."""
+    if not (PACKAGE.parent / ".git").exists():
+        return None
+    command = ["git", "describe", "--always", "--dirty", "--abbrev=40", "--exclude=*"]
+    try:
+        done = subprocess.run(command, cwd=PACKAGE.parent, capture_output=True, text=True, timeout=5, check=False)
+    except (OSError, subprocess.TimeoutExpired):
+        return None
+    return done.stdout.strip() or None

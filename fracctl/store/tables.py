@@ -1,0 +1,85 @@
+"""Parquet files with page checksums: serialised, streamed, read."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from fracctl.errors import RunError
+from fracctl.store.files import atomic
+
+ROWS_IN_GROUP = 65_536
+"""Smaller parts are joined to row groups of about this size."""
+
+_COMPRESSION = "zstd"
+
+
+def serialise(table: pa.Table) -> bytes:
+    """Return a table as the bytes of a Parquet file."""
+    sink = pa.BufferOutputStream()
+    pq.write_table(table, sink, compression=_COMPRESSION, write_page_checksum=True)
+    content: bytes = sink.getvalue().to_pybytes()
+    return content
+
+
+def deserialise(content: bytes) -> pa.Table:
+    """Read the bytes of a Parquet file, verifying every page."""
+    return pq.read_table(pa.BufferReader(content), page_checksum_verification=True)
+
+
+def write(path: Path, schema: pa.Schema, tables: Iterable[pa.Table]) -> None:
+    """Write tables that follow each other to one file, atomically and without holding them all."""
+    with (
+        atomic(path) as file,
+        pq.ParquetWriter(file, schema, compression=_COMPRESSION, write_page_checksum=True) as writer,
+    ):
+        for group in _groups(tables):
+            writer.write_table(group.replace_schema_metadata(schema.metadata))
+
+
+def _groups(tables: Iterable[pa.Table]) -> Iterator[pa.Table]:
+    waiting: list[pa.Table] = []
+    for table in tables:
+        waiting.append(table)
+        if sum(part.num_rows for part in waiting) >= ROWS_IN_GROUP:
+            yield pa.concat_tables(waiting).combine_chunks()
+            waiting = []
+    if waiting:
+        yield pa.concat_tables(waiting).combine_chunks()
+
+
+def read(path: Path, columns: list[str] | None = None) -> pa.Table:
+    """Read a file, verifying every page.
+
+    Raises:
+        RunError: it is not there, or damaged.
+    """
+    with _read_errors(path):
+        return pq.read_table(path, columns=columns, page_checksum_verification=True)
+
+
+@contextmanager
+def _read_errors(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except (OSError, pa.ArrowException) as problem:
+        raise RunError(f"cannot read {path}: {problem}") from problem
+
+
+def stream(path: Path) -> Iterator[pa.Table]:
+    """Read a file row group by row group, verifying every page."""
+    with _read_errors(path), pq.ParquetFile(path, page_checksum_verification=True) as file:
+        for number in range(file.num_row_groups):
+            yield file.read_row_group(number)
+
+
+def to_pandas(table: pa.Table) -> pd.DataFrame:
+    """Return a table as a data frame; verdicts are nullable booleans."""
+    kinds = {pa.bool_(): pd.BooleanDtype()}
+    frame: pd.DataFrame = table.to_pandas(types_mapper=kinds.get)
+    return frame
