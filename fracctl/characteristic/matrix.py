@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from fracctl.arrays import Array, Complexes, Floats
+from fracctl.fractional.system import LinearFractionalSystem
 from fracctl.fractional.terms import FractionalTerm, powers
-from fracctl.loop import LinearFractionalSystem
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ class CharacteristicMatrix:
         self.system = system
         self.size = system.size
         self.batch = system.batch or 1
-        self.highest = np.array([2.0] * system.n_positions + [1.0] * system.n_auxiliary)
+        self.highest = system.highest
         self.entries = [
             [_entry(system.dynamics, i, k, float(self.highest[k])) for k in range(self.size)]
             for i in range(self.size)

@@ -35,7 +35,7 @@ def principal_poles(matrix: CharacteristicMatrix) -> tuple[Complexes, bool]:
     expected = _count(matrix)
     radius = float(pole_radius(matrix)[0])
     poles: list[complex] = []
-    for n_radii, n_angles in ((12, 17), (40, 61), (120, 181)):
+    for n_radii, n_angles in ((24, 17), (80, 61), (240, 181)):
         poles = _distinct(_newton(matrix, _mesh(radius, n_radii, n_angles)))
         if len(poles) >= expected:
             break
@@ -95,7 +95,7 @@ def _count(matrix: CharacteristicMatrix) -> int:
 
 
 def _mesh(radius: float, n_radii: int, n_angles: int) -> Complexes:
-    radii = radius * np.geomspace(1e-3, 1.0, n_radii)
+    radii = radius * np.geomspace(1e-9, 1.0, n_radii)
     angles = np.linspace(0.0, np.pi - 0.02, n_angles)
     return np.ravel(radii[:, None] * np.exp(1j * angles))
 

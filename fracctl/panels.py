@@ -1,0 +1,189 @@
+"""Functions of time on Chebyshev panels: interpolation, slopes and integrals for whole batches.
+
+A panel is an interval of time with n Chebyshev-Lobatto nodes in a variable y in [-1, 1]; time is linear in y, or
+its logarithm is (the first panel, where solutions behave as powers of time). Values have the nodes of all panels as
+their last axis.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+
+import numpy as np
+
+from fracctl.arrays import Array, Floats
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One interval of time."""
+
+    start: float
+    end: float
+    nodes: int
+    """Number n of Chebyshev-Lobatto nodes, both ends included."""
+    logarithmic: bool = False
+    """Whether ln t instead of t is linear in y."""
+
+    def time(self, y: Floats) -> Floats:
+        """Return time at y."""
+        if self.logarithmic:
+            return self.start * (self.end / self.start) ** (0.5 * (y + 1.0))
+        return self.start + 0.5 * (self.end - self.start) * (y + 1.0)
+
+    def y(self, time: Floats) -> Floats:
+        """Return y at times of this panel."""
+        if self.logarithmic:
+            return 2.0 * np.log(time / self.start) / np.log(self.end / self.start) - 1.0
+        return 2.0 * (time - self.start) / (self.end - self.start) - 1.0
+
+    def rate(self, y: Floats) -> Floats:
+        """Return dt/dy at y."""
+        if self.logarithmic:
+            return 0.5 * np.log(self.end / self.start) * self.time(y)
+        return np.full_like(y, 0.5 * (self.end - self.start))
+
+
+@dataclass(frozen=True)
+class _Rule:
+    """Matrices of n Chebyshev-Lobatto nodes in y."""
+
+    y: Floats
+    weights: Floats
+    """Barycentric weights, (n,)."""
+    slope: Floats
+    """d/dy at the nodes, (n, n), to be applied from the right."""
+    pieces: Floats
+    """Integrals between neighbouring nodes, (n, n - 1), from the right."""
+    last: Floats
+    """The last three Chebyshev coefficients, (n, 3), from the right."""
+
+
+@lru_cache(maxsize=256)
+def _rule(n: int) -> _Rule:
+    k = np.arange(n)
+    y = np.sin(0.5 * np.pi * (2.0 * k - (n - 1)) / (n - 1))
+    weights = (-1.0) ** k
+    weights[[0, -1]] *= 0.5
+    gap = y[:, None] - y + np.eye(n)
+    slope = (weights / weights[:, None]) / gap
+    slope -= np.diag(slope.sum(axis=1))
+    x, w = np.polynomial.legendre.leggauss(n // 2 + 1)
+    half = 0.5 * np.diff(y)
+    points = y[:-1, None] + half[:, None] * (x + 1.0)
+    basis = interpolation(y, weights, points.ravel()).reshape(n - 1, len(x), n)
+    pieces = np.einsum("j,g,jgi->ij", half, w, basis)
+    degrees = np.arange(n - 3, n)
+    cosines = np.cos(degrees * np.pi * (n - 1 - k)[:, None] / (n - 1))
+    scale = np.where(degrees == n - 1, 1.0, 2.0) / (n - 1)
+    last = cosines * scale * np.where((k == 0) | (k == n - 1), 0.5, 1.0)[:, None]
+    return _Rule(y, weights, np.ascontiguousarray(slope.T), np.ascontiguousarray(pieces), last)
+
+
+def interpolation(nodes: Floats, weights: Floats, y: Floats) -> Floats:
+    """Return the matrix (r, n) that takes node values to values at the r points y (barycentric form)."""
+    gap = y[:, None] - nodes
+    hit = gap == 0.0
+    rows = hit.any(axis=1)
+    gap[hit] = 1.0
+    matrix = weights / gap
+    matrix /= matrix.sum(axis=1, keepdims=True)
+    matrix[rows] = hit[rows]
+    return matrix
+
+
+class PanelGrid:
+    """The nodes of consecutive panels, and what can be done with values on them.
+
+    Args:
+        panels: at least one, each beginning where its predecessor ends.
+    """
+
+    def __init__(self, panels: Sequence[Panel]) -> None:
+        self.panels = tuple(panels)
+        self.rules = [_rule(panel.nodes) for panel in self.panels]
+        self.offsets = np.concatenate([[0], np.cumsum([panel.nodes for panel in self.panels])])
+        pairs = list(zip(self.panels, self.rules, strict=True))
+        self.y: Floats = np.concatenate([rule.y for rule in self.rules])
+        self.times: Floats = np.concatenate([panel.time(rule.y) for panel, rule in pairs])
+        self.rates: Floats = np.concatenate([panel.rate(rule.y) for panel, rule in pairs])
+        for i, panel in enumerate(self.panels):
+            self.times[self.offsets[i]], self.times[self.offsets[i + 1] - 1] = panel.start, panel.end
+
+    @property
+    def horizon(self) -> float:
+        """The end of the last panel."""
+        return self.panels[-1].end
+
+    @cached_property
+    def left(self) -> Array:
+        """Index of the left node of each interval between neighbouring nodes of a panel."""
+        return np.concatenate([np.arange(a, b - 1) for a, b in zip(self.offsets, self.offsets[1:], strict=False)])
+
+    @cached_property
+    def panel_of_node(self) -> Array:
+        """Number of the panel of each node."""
+        return np.repeat(np.arange(len(self.panels)), np.diff(self.offsets))
+
+    def slices(self) -> Iterator[tuple[slice, Panel, _Rule]]:
+        """Yield where in the node axis each panel stands, the panel and its rule."""
+        for i, (panel, rule) in enumerate(zip(self.panels, self.rules, strict=True)):
+            yield slice(int(self.offsets[i]), int(self.offsets[i + 1])), panel, rule
+
+    def slope(self, values: Floats) -> Floats:
+        """Return d/dy of values (…, T) at the nodes."""
+        out = np.empty_like(values)
+        for where, _, rule in self.slices():
+            out[..., where] = values[..., where] @ rule.slope
+        return out
+
+    def derivative(self, values: Floats) -> Floats:
+        """Return d/dt of values (…, T) at the nodes."""
+        return self.slope(values) / self.rates
+
+    def pieces(self, values: Floats) -> Floats:
+        """Return the integrals over time between neighbouring nodes, (…, T - number of panels)."""
+        out = np.empty((*values.shape[:-1], len(self.left)))
+        weighted = values * self.rates
+        for i, (where, _, rule) in enumerate(self.slices()):
+            out[..., where.start - i : where.stop - i - 1] = weighted[..., where] @ rule.pieces
+        return out
+
+    def tail(self, values: Floats) -> Floats:
+        """Return the largest of the last three Chebyshev coefficients of any panel, (…)."""
+        parts = [np.abs(values[..., where] @ rule.last).max(axis=-1) for where, _, rule in self.slices()]
+        largest: Floats = np.max(parts, axis=0)
+        return largest
+
+    def evaluate(self, values: Floats, times: Floats) -> Floats:
+        """Return values (…, T) interpolated at times (t,); before the first node the first value."""
+        out = np.empty((*values.shape[:-1], len(times)))
+        starts = np.array([panel.start for panel in self.panels])
+        owner = np.clip(np.searchsorted(starts, times, side="right") - 1, 0, len(self.panels) - 1)
+        for i, (where, panel, rule) in enumerate(self.slices()):
+            mine = owner == i
+            if mine.any():
+                y = np.clip(panel.y(np.maximum(times[mine], panel.start)), -1.0, 1.0)
+                out[..., mine] = values[..., where] @ interpolation(rule.y, rule.weights, y).T
+        return out
+
+    def at(self, rows: Array, panels: Array, y: Floats, *values: Floats) -> list[Floats]:
+        """Return each of `values` (b, T) at scattered points: member rows[i], panel panels[i], y[i]; shape (r,)."""
+        out = [np.empty(len(rows)) for _ in values]
+        for i, (where, _, rule) in enumerate(self.slices()):
+            mine = np.flatnonzero(panels == i)
+            if mine.size:
+                matrix = interpolation(rule.y, rule.weights, y[mine])
+                for result, value in zip(out, values, strict=True):
+                    result[mine] = np.einsum("rn,rn->r", matrix, value[rows[mine], where])
+        return out
+
+    def time_at(self, panels: Array, y: Floats) -> Floats:
+        """Return the time of scattered points."""
+        out = np.empty(len(y))
+        for i, panel in enumerate(self.panels):
+            mine = panels == i
+            out[mine] = panel.time(y[mine])
+        return out
