@@ -59,7 +59,7 @@ def abscissa_bound(matrix: CharacteristicMatrix, resolution: float) -> Floats:
 def _none_right_of(matrix: CharacteristicMatrix, abscissa: Floats, outer: Floats) -> Booleans:
     heights = np.linspace(1.0, 0.0, 400) ** 2 * outer[:, None]
     values = matrix.determinant(abscissa[:, None] + 1j * heights)
-    turns, ambiguous = _crossings(values)
+    turns, ambiguous = crossings(values)
     clear: Booleans = (turns == 0.0) & ~ambiguous.any(axis=1) & (values[:, -1].real > 0.0)
     return clear
 
@@ -67,7 +67,7 @@ def _none_right_of(matrix: CharacteristicMatrix, abscissa: Floats, outer: Floats
 def _turns(matrix: CharacteristicMatrix, path: Complexes) -> tuple[Floats, Booleans]:
     """Return phase change over 2π along `path` (b,), and whether every step of it was resolved."""
     values = matrix.determinant(path)
-    turns, ambiguous = _crossings(values)
+    turns, ambiguous = crossings(values)
     resolved = np.ones(len(turns), dtype=bool)
     rows, steps = np.nonzero(ambiguous)
     left, right = path[steps], path[steps + 1]
@@ -80,7 +80,7 @@ def _turns(matrix: CharacteristicMatrix, path: Complexes) -> tuple[Floats, Boole
         halves = [(left, left_value, middle, value), (middle, value, right, right_value)]
         pending = []
         for a, value_a, b, value_b in halves:
-            turn, open_ = _crossings(np.stack([value_a, value_b], axis=1))
+            turn, open_ = crossings(np.stack([value_a, value_b], axis=1))
             np.add.at(turns, rows, turn)
             again = open_[:, 0] & ~stuck
             pending.append((rows[again], a[again], b[again], value_a[again], value_b[again]))
@@ -95,7 +95,7 @@ def _between(left: Complexes, right: Complexes) -> Complexes:
     return radius * np.exp(0.5j * (np.angle(left) + np.angle(right)))
 
 
-def _crossings(values: Complexes) -> tuple[Floats, Booleans]:
+def crossings(values: Complexes) -> tuple[Floats, Booleans]:
     """Count crossings of the negative real axis, counter-clockwise ones as +1, along (b, k).
 
     A step that moves by two quadrants is ambiguous: it is marked in (b, k - 1) and not counted.

@@ -1,0 +1,138 @@
+"""Where the contour solver puts nodes: windows of time, their contours and their panels."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import lru_cache
+
+import numpy as np
+
+from fracctl.arrays import Array, Complexes, Floats
+from fracctl.panels import Panel, PanelGrid
+from fracctl.solvers.contour_design import ContourShape, design
+
+LARGEST_RATIO = 8.0
+SERIES_REACH = 0.03
+"""Time, times the pole radius, up to which the solution is taken from its power series."""
+SERIES_START = 1e-10
+"""First time of the first panel, relative to its end."""
+SERIES_NODES = 26
+_LONGEST = 36.0
+"""Half-length of a panel times the largest frequency, beyond which a window is split."""
+
+
+@dataclass(frozen=True)
+class Window:
+    """One contour and the grid nodes it serves.
+
+    The path holds, in order along the contour, the trapezoid nodes (even places) and the midpoint nodes (odd places)
+    of the same step, then a few more that lead out to where the characteristic matrix is close to the identity.
+    """
+
+    path: Complexes
+    """σ, (2N + 1 + extra,)."""
+    weights: Complexes
+    """(h/π) dσ/dθ at the first 2N + 1 of them; half at θ = 0."""
+    nodes: int
+    """N, the number of midpoint nodes."""
+    where: slice
+    """Grid nodes of this window."""
+    times: Floats
+    """Their times, (t,)."""
+    checked: Array
+    """Which of these times compare the two rules."""
+    shift: float
+    """a, the real part that the contour was shifted by."""
+    _kernels: dict[float, tuple[Floats, Floats]] = field(default_factory=dict)
+
+    def kernels(self, exponent: float) -> tuple[Floats, Floats]:
+        """Return real matrices (2N, t) and (2N + 2, checked) that take interleaved Z(σ) to (σ^e Z)(t)."""
+        if exponent not in self._kernels:
+            if len(self._kernels) > 64:
+                self._kernels.clear()
+            last = 2 * self.nodes + 1
+            powers = np.exp(exponent * np.log(self.path[:last])) * self.weights
+            middle = self._matrix(slice(1, last, 2), powers, self.times)
+            ends = self._matrix(slice(0, last, 2), powers, self.times[self.checked])
+            self._kernels[exponent] = (middle, ends)
+        return self._kernels[exponent]
+
+    def _matrix(self, which: slice, powers: Complexes, times: Floats) -> Floats:
+        complex_kernel = powers[which, None] * np.exp(self.path[which, None] * times)
+        matrix = np.empty((2 * len(complex_kernel), len(times)))
+        matrix[0::2], matrix[1::2] = complex_kernel.imag, complex_kernel.real
+        return matrix
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Grid and windows for a horizon and a hull of poles."""
+
+    grid: PanelGrid
+    windows: tuple[Window, ...]
+
+    @property
+    def nodes(self) -> int:
+        """Nodes at which the transform is evaluated, all windows."""
+        return sum(len(window.path) for window in self.windows)
+
+
+@lru_cache(maxsize=64)
+def make_plan(horizon: float, hull: float, radius: float, shift: float, tolerance: float) -> Plan:
+    """Return the plan for poles with Re σ ≤ shift, |Im σ| ≤ hull, all within |σ| < radius.
+
+    Args:
+        horizon: last time S.
+        hull: largest imaginary part that the contours are designed for.
+        radius: a circle that holds all poles; sets where the power series ends.
+        shift: a, bound on the real parts of poles in the right half plane, 0 for stable loops.
+        tolerance: relative error of the quadrature.
+    """
+    reach = max(horizon * (radius + shift) / SERIES_REACH, 2.0)
+    count = int(np.ceil(np.log(reach) / np.log(LARGEST_RATIO)))
+    ratio = reach ** (1.0 / count)
+    edges = horizon * ratio ** np.arange(-count, 1.0)
+    edges[-1] = horizon
+    panels = [Panel(float(edges[0] * SERIES_START), float(edges[0]), SERIES_NODES, logarithmic=True)]
+    groups = [_panels(float(a), float(b), hull, tolerance) for a, b in zip(edges, edges[1:], strict=False)]
+    grid = PanelGrid([*panels, *(panel for group in groups for panel in group)])
+    windows, first = [], 1
+    for group in groups:
+        where = slice(int(grid.offsets[first]), int(grid.offsets[first + len(group)]))
+        first += len(group)
+        shape = design(tolerance, round(ratio, 3) + 1e-3, _rounded_up(hull * group[-1].end))
+        windows.append(_window(shape, where, grid.times[where], radius, shift))
+    return Plan(grid, tuple(windows))
+
+
+def _rounded_up(height: float) -> float:
+    """Round to the next power of 1.1, so that few different contours are designed."""
+    return float(1.1 ** np.ceil(np.log(height) / np.log(1.1)))
+
+
+def _panels(start: float, end: float, hull: float, tolerance: float) -> list[Panel]:
+    """Split a window so that panels of polynomials resolve both the powers of time at 0 and the oscillation."""
+    count = int(np.ceil(0.5 * hull * (end - start) / _LONGEST))
+    edges = np.linspace(start, end, max(count, 1) + 1)
+    panels = []
+    for a, b in zip(edges, edges[1:], strict=False):
+        half, centre = 0.5 * (b - a), 0.5 * (b + a)
+        ellipse = centre / half + np.sqrt((centre / half) ** 2 - 1.0)
+        smooth = -np.log(tolerance) / np.log(ellipse)
+        waves = hull * half
+        panels.append(Panel(float(a), float(b), int(np.ceil(max(smooth, waves + 9.5 * waves ** (1.0 / 3.0), 10.0)))))
+    return panels
+
+
+def _window(shape: ContourShape, where: slice, times: Floats, radius: float, shift: float) -> Window:
+    last = 2 * shape.nodes + 1
+    half = 0.5 * shape.step
+    end = float(times[-1])
+    theta = half * np.arange(last)
+    far = np.arccosh(1.0 + (shape.vertex + 2.5 * (radius + shift) * end) / shape.bend)
+    beyond = np.arange(theta[-1] + 2.0 * half, max(far, theta[-1]) + 2.0 * half, 2.0 * half)
+    sigma, slope = shape.at(np.concatenate([theta, beyond]))
+    weights = (shape.step / np.pi) * slope[:last] / end
+    weights[0] *= 0.5
+    checked = np.unique(np.linspace(0, len(times) - 1, 5).astype(int))
+    return Window(shift + sigma / end, weights, shape.nodes, where, times, checked, shift)

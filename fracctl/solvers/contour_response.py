@@ -1,0 +1,251 @@
+"""Responses of a batch of linear fractional loops on the windows of a plan.
+
+With y = y(0) + z the transform Z of z solves M(σ) Z = r(σ), and M̃ Z̃ = r for Z̃ = σ^ℓ Z. One fill of Z̃ at the
+nodes of a window serves every derivative of every coordinate: D^γ z(t) is a real matrix product with the kernel of
+σ^(γ - ℓ), in which no initial value cancels.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import rgamma
+
+from fracctl.arrays import Booleans, Complexes, Floats
+from fracctl.characteristic.matrix import CharacteristicMatrix, determinant, stack
+from fracctl.characteristic.winding import crossings
+from fracctl.fractional.series import short_time_series
+from fracctl.fractional.system import LinearFractionalSystem
+from fracctl.solvers.contour_plan import Plan, Window
+
+SERIES_ORDER = 5.0
+Request = tuple[int, float] | tuple[int, int, int]
+"""(component, order), or (component, term, column) for an order of the control's term that members do not share."""
+
+
+@dataclass(frozen=True)
+class Response:
+    """Values of a group of members on the grid of a plan, from k initial states each."""
+
+    positions: Floats
+    """(k, b, m, T)."""
+    rates: Floats | None
+    """(k, b, m, T)."""
+    auxiliary: Floats
+    """(k, b, q, T)."""
+    controls: Floats
+    """(k, b, m, T)."""
+    error: Floats
+    """Difference of the two quadrature rules, interpolation and series remainders over the peak, (k, b)."""
+    enclosed: Booleans
+    """Whether every contour has all poles on its left, (b,)."""
+
+
+@dataclass(frozen=True)
+class _Derivative:
+    """D^order of one coordinate, to be computed; `order` is a number or (b,)."""
+
+    component: int
+    order: Floats
+
+
+def respond(system: LinearFractionalSystem, y0: Floats, y0_rate: Floats, plan: Plan, with_rates: bool) -> Response:
+    """Solve the members of `system` from y(0), y'(0), each (k, b, p) or (k, 1, p), on the grid of `plan`."""
+    b, m, p = system.batch or 1, system.n_positions, system.size
+    y0, y0_rate = (np.broadcast_to(v, (v.shape[0], b, p)) for v in (y0, y0_rate))
+    orders = [_Derivative(i, np.zeros(())) for i in range(p)]
+    orders += [_Derivative(i, np.ones(())) for i in range(m)] if with_rates else []
+    places: list[tuple[int, int, int]] = []
+    for j, term in enumerate(system.control):
+        for column in range(p):
+            if np.any(term.matrix[..., column]):
+                wanted = _Derivative(column, term.orders[..., column])
+                places.append((j, column, _index(orders, wanted)))
+    values, differences, enclosed = _derivatives(system, y0, y0_rate, plan, orders)
+    controls, control_difference = _controls(system, places, values, differences)
+    positions = np.moveaxis(values[:m], 0, 2)
+    tail = plan.grid.tail
+    error = np.maximum(
+        _relative(_largest(differences[:m]), tail(positions).max(axis=-1), _peak(positions, y0[..., :m])),
+        _relative(control_difference.max(axis=(0, -1)), tail(controls).max(axis=-1), _peak(controls)),
+    )
+    rates = np.moveaxis(values[p : p + m], 0, 2) if with_rates else None
+    auxiliary = np.moveaxis(values[m:p], 0, 2)
+    return Response(positions, rates, auxiliary, controls, error, enclosed)
+
+
+def _index(orders: list[_Derivative], wanted: _Derivative) -> int:
+    for i, known in enumerate(orders):
+        if known.component == wanted.component and np.array_equal(known.order, wanted.order):
+            return i
+    orders.append(wanted)
+    return len(orders) - 1
+
+
+def _peak(values: Floats, initial: Floats | None = None) -> Floats:
+    peak = np.abs(values).max(axis=(-2, -1))
+    return peak if initial is None else np.maximum(peak, np.abs(initial).max(axis=-1))
+
+
+def _largest(differences: Floats) -> Floats:
+    return differences.max(axis=(0, -1))
+
+
+def _relative(difference: Floats, tail: Floats, peak: Floats) -> Floats:
+    return np.divide(np.maximum(difference, tail), peak, out=np.zeros_like(peak), where=peak > 0.0)
+
+
+def _controls(
+    system: LinearFractionalSystem, places: list[tuple[int, int, int]], values: Floats, differences: Floats
+) -> tuple[Floats, Floats]:
+    """Combine derivatives to υ (k, b, m, T), and their differences to a bound (m, k, b, c)."""
+    _, k, b, t = values.shape
+    m = system.n_positions
+    controls = np.zeros((k, b, m, t))
+    difference = np.zeros((m, k, b, differences.shape[-1]))
+    for j, column, where in places:
+        matrix = np.broadcast_to(system.control[j].matrix, (b, m, system.size))
+        for row in range(m):
+            gain = matrix[:, row, column]
+            if np.any(gain):
+                controls[:, :, row] += gain[:, None] * values[where]
+                difference[row] += np.abs(gain)[:, None] * differences[where]
+    return controls, difference
+
+
+def _derivatives(
+    system: LinearFractionalSystem, y0: Floats, y0_rate: Floats, plan: Plan, orders: list[_Derivative]
+) -> tuple[Floats, Floats, Booleans]:
+    """Return all derivatives on the grid (w, k, b, T), rule differences (w, k, b, windows), enclosure (b,)."""
+    matrix = CharacteristicMatrix(system)
+    k, b, _ = y0.shape
+    values = np.empty((len(orders), k, b, len(plan.grid.times)))
+    differences = np.empty((len(orders), k, b, len(plan.windows) + 1))
+    _start(system, y0, y0_rate, plan, orders, values, differences)
+    enclosed = np.ones(b, dtype=bool)
+    for number, window in enumerate(plan.windows):
+        transforms, inside = _transforms(matrix, y0, y0_rate, window)
+        enclosed &= inside
+        for i, wanted in enumerate(orders):
+            transform = transforms[wanted.component]
+            main, ends = _inverse(window, transform, wanted.order, float(system.highest[wanted.component]))
+            checked = np.abs(main[..., window.checked] - ends).max(axis=-1)
+            differences[i, :, :, number + 1] = checked
+            initial = _initial_value(wanted, y0, y0_rate, window.times)
+            values[i, :, :, window.where] = main if initial is None else main + initial
+    return values, differences, enclosed
+
+
+def _start(
+    system: LinearFractionalSystem,
+    y0: Floats,
+    y0_rate: Floats,
+    plan: Plan,
+    orders: list[_Derivative],
+    values: Floats,
+    differences: Floats,
+) -> None:
+    """Fill the first panel from the power series, and the first column of `differences` with its remainder."""
+    panel = plan.grid.panels[0]
+    times = plan.grid.times[: panel.nodes]
+    series = short_time_series(system, y0, y0_rate, SERIES_ORDER)
+    for i, wanted in enumerate(orders):
+        values[i, :, :, : panel.nodes] = series.derivative(wanted.component, wanted.order, times)
+        # the omitted power, differentiated: Γ(e + 1) / Γ(e - γ + 1) grows at most as e^γ
+        order = np.maximum(wanted.order, 0.0)
+        growth = panel.end ** (series.cut - order) * (series.cut + 1.0) ** order
+        differences[i, :, :, 0] = series.remainder * growth
+
+
+def _transforms(
+    matrix: CharacteristicMatrix, y0: Floats, y0_rate: Floats, window: Window
+) -> tuple[list[Complexes], Booleans]:
+    """Return Z̃ of each coordinate, (k, b, 2N + 1), and whether the contour encloses all poles, (b,)."""
+    last = 2 * window.nodes + 1
+    entries = matrix(window.path)
+    shape = (matrix.batch, len(window.path))
+    det = np.broadcast_to(determinant(entries, shape), shape)
+    turns, ambiguous = crossings(det)
+    enclosed = (turns == 0.0) & ~ambiguous.any(axis=1) & (det[:, 0].real > 0.0)
+    inside = [[None if entry is None else entry[..., :last] for entry in row] for row in entries]
+    right = _right_hand_side(matrix.system, y0, y0_rate, window.path[:last])
+    return _solved(inside, right, det[:, :last]), enclosed
+
+
+def _right_hand_side(
+    system: LinearFractionalSystem, y0: Floats, y0_rate: Floats, sigma: Complexes
+) -> list[Complexes | None]:
+    """Return r_i = Σ_{β>1} A_j σ^(β-2) y'(0) - Σ_{β≤0} A_j σ^(β-1) y(0), each (k, b, nodes) or None if zero."""
+    b = system.batch or 1
+    right: list[Complexes | None] = [None] * system.size
+    for term in system.dynamics:
+        matrix = np.broadcast_to(term.matrix, (b, *term.matrix.shape[-2:]))
+        for row, column in np.argwhere(matrix.any(axis=0)):
+            order = term.orders[..., column]
+            if np.all(order <= 0.0):
+                coefficient, exponent = -matrix[:, row, column] * y0[..., column], order - 1.0
+            elif np.all(order > 1.0):
+                coefficient, exponent = matrix[:, row, column] * y0_rate[..., column], order - 2.0
+            else:
+                continue
+            if np.any(coefficient):
+                power = np.exp(np.asarray(exponent)[..., None] * np.log(sigma)) if np.any(exponent) else 1.0
+                part = coefficient[..., None] * power
+                right[row] = part if right[row] is None else right[row] + part
+    return right
+
+
+def _solved(entries: list[list[Complexes | None]], right: list[Complexes | None], det: Complexes) -> list[Complexes]:
+    """Solve M̃ Z̃ = r at every node."""
+    size = len(entries)
+    shape = next((np.broadcast_shapes(r.shape, det.shape) for r in right if r is not None), (1, *det.shape))
+    zero = np.zeros(shape, dtype=np.complex128)
+    if all(r is None for r in right):
+        return [zero] * size
+    if size == 1:
+        assert right[0] is not None
+        return [right[0] / det]
+    if size == 2:
+        inverse = 1.0 / det
+        (a, b), (c, d) = entries
+        first = [_product(d, right[0]), _product(b, right[1])]
+        second = [_product(a, right[1]), _product(c, right[0])]
+        return [(plus - minus) * inverse for plus, minus in (first, second)]
+    vector = np.stack([np.broadcast_to(zero if r is None else r, shape) for r in right], axis=-1)
+    matrices = np.broadcast_to(stack(entries, det.shape), (*shape, size, size))
+    solution = np.linalg.solve(matrices, vector[..., None])[..., 0]
+    return [np.ascontiguousarray(solution[..., i]) for i in range(size)]
+
+
+def _product(entry: Complexes | None, right: Complexes | None) -> Complexes | float:
+    return 0.0 if entry is None or right is None else entry * right
+
+
+def _inverse(window: Window, transform: Complexes, order: Floats, highest: float) -> tuple[Floats, Floats]:
+    """Return (σ^order Z)(t) at the window's times and, by the other rule, at its checked times, (k, b, t)."""
+    if order.ndim == 0:
+        middle, ends = window.kernels(float(order) - highest)
+    else:
+        middle, ends = window.kernels(-highest)
+        sigma = window.path[: transform.shape[-1]]
+        transform = transform * np.exp(order[:, None] * np.log(sigma))
+    odd = np.ascontiguousarray(transform[..., 1::2]).view(np.float64)
+    even = np.ascontiguousarray(transform[..., 0::2]).view(np.float64)
+    return odd @ middle, even @ ends
+
+
+def _initial_value(wanted: _Derivative, y0: Floats, y0_rate: Floats, times: Floats) -> Floats | None:
+    """Return D^γ of y(0) for γ ≤ 0; minus the power that σ^γ Z has too much of for 1 < γ; None where zero."""
+    order, column = wanted.order, wanted.component
+    if np.all(order <= 0.0):
+        coefficient, power = y0[..., column], -order
+    elif np.all(order > 1.0):
+        coefficient, power = -y0_rate[..., column], 1.0 - order
+    else:
+        return None
+    if not np.any(coefficient):
+        return None
+    exponent = np.asarray(power)[..., None]
+    values: Floats = coefficient[..., None] * times**exponent * rgamma(exponent + 1.0)
+    return values
