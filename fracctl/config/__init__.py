@@ -1,0 +1,1 @@
+"""Configurations: composed by Hydra, validated by schemas, turned into objects."""

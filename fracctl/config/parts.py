@@ -1,0 +1,182 @@
+"""The parts of a run whose keys depend on other parts: on the type, the plant's states, the law's parameters."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, ValidationInfo, create_model
+from pydantic_core import InitErrorDetails, PydanticCustomError
+
+from fracctl.config import registry
+from fracctl.config.fields import Number, Strict, each, refusal, refuse, unknown
+from fracctl.config.options import construct, factory_of, named_factory, options_of
+from fracctl.controllers import Parameter
+from fracctl.errors import ArgumentError
+from fracctl.plants import LinearPlant
+from fracctl.surveys import axis_values
+
+LARGEST_GRID = 100_000_000
+"""More points than this are taken for a mistyped step."""
+
+_HCW_STATES = ("u", "v", "w", "u_dot", "v_dot", "w_dot")
+
+
+def registered(value: Any, info: ValidationInfo) -> Strict:
+    """A plant or a solver."""
+    factory = factory_of(f"{info.field_name}s", plain(value))
+    options = options_of(factory).model_validate(plain(value))
+    construct(factory, options)
+    return options
+
+
+def controller(value: Any, info: ValidationInfo) -> Strict:
+    """A law: its parameters for the components of the plant; unchecked while the plant is wrong."""
+    law = factory_of("controllers", plain(value))
+    plant = plant_of(info.data)
+    return law_schema(law, plant.components).model_validate(plain(value)) if plant else Strict()
+
+
+@cache
+def law_schema(law: Any, components: tuple[str, ...]) -> type[Strict]:
+    """The schema of a law's parameters."""
+    fields: dict[str, Any] = {"type": (str, ...)}
+    for parameter in law.parameters(components):
+        fields[parameter.name] = (Annotated[Number, AfterValidator(_within(parameter))], parameter.default)
+    return create_model(f"{law.__name__}Parameters", __base__=Strict, **fields)
+
+
+def initial_condition(value: Any, info: ValidationInfo) -> Strict:
+    """One initial condition of the plant; unchecked while the plant is wrong."""
+    plant = plant_of(info.data)
+    if plant is None:
+        return Strict()
+    options = states_schema(state_keys(plant)).model_validate(plain(value))
+    given = options.model_dump()
+    if given["units"] == "si" and plant.scales is None:
+        raise refuse(refusal(("units",), "si", "needs a plant with scales; set plant.scales or use dimensionless values"))
+    if not any(given[name] for name in plant.state_names):
+        states = ", ".join(plant.state_names)
+        raise refuse(refusal((), given, f"nothing moves, for all states of the plant are 0; set one of {states}", "sentence"))
+    return options
+
+
+@cache
+def states_schema(names: tuple[str, ...]) -> type[Strict]:
+    """The schema of an initial condition; states that are not given are 0."""
+    fields: dict[str, Any] = {"units": (Literal["dimensionless", "si"], "dimensionless")}
+    fields |= {name: (Number, 0.0) for name in names}
+    return create_model("InitialCondition", __base__=Strict, **fields)
+
+
+def state_keys(plant: LinearPlant) -> tuple[str, ...]:
+    """Keys of an initial condition: the plant's states, or all six for a part of HCW."""
+    return _HCW_STATES if set(plant.components) <= set("uvw") else plant.state_names
+
+
+def measures(value: Any) -> dict[str, Strict]:
+    """Options of measures by their names."""
+    if not isinstance(value, Mapping) or not value:
+        raise refuse(refusal((), value, "must be a mapping of measures to their options"))
+
+    def measure(name: str, entry: Any) -> Strict:
+        if name not in registry.names("measures"):
+            raise refuse(unknown((), entry, registry.names("measures")))
+        factory = named_factory("measures", name)
+        options = options_of(factory, named=False).model_validate({} if entry is None else plain(entry))
+        construct(factory, options)
+        return options
+
+    return each(value, measure)
+
+
+def survey(value: Any, info: ValidationInfo, built_in: Mapping[str, type[Strict]]) -> Strict:
+    """A survey; the axes of a grid are checked against the law's parameters."""
+    value = plain(value)
+    factory = factory_of("surveys", value)
+    if value["type"] not in built_in:
+        return options_of(factory, omitted=("parameters",)).model_validate(value)
+    options = built_in[value["type"]].model_validate(value)
+    parameters = parameters_of(info.data)
+    if value["type"] == "grid":
+        lines = _grid_lines(options.model_dump(), parameters)
+        if lines:
+            raise refuse(*lines)
+    return options
+
+
+def plant_of(data: Mapping[str, Any]) -> LinearPlant | None:
+    """The plant of the fields validated so far, None if it is wrong."""
+    options = data.get("plant")
+    return None if options is None else construct(registry.load("plants", options.type), options)  # type: ignore[no-any-return]
+
+
+def parameters_of(data: Mapping[str, Any]) -> dict[str, Parameter] | None:
+    """The law's parameters by name, None if the plant or the controller is wrong."""
+    plant, options = plant_of(data), data.get("controller")
+    if plant is None or options is None:
+        return None
+    law = registry.load("controllers", options.type)
+    return {parameter.name: parameter for parameter in law.parameters(plant.components)}
+
+
+def measure_columns(options: Mapping[str, Strict]) -> list[str]:
+    """The columns that the measures fill."""
+    made = (construct(registry.load("measures", name), entry) for name, entry in options.items())
+    return [column for measure in made for column in measure.columns]
+
+
+def plain(value: Any) -> Any:
+    """A model as plain data; everything else as it is."""
+    return value.model_dump() if isinstance(value, Strict) else value
+
+
+def _within(parameter: Parameter) -> Callable[[float], float]:
+    def check(value: float) -> float:
+        if not parameter.contains(value):
+            raise PydanticCustomError("refused", parameter.allowed)  # type: ignore[arg-type]
+        return value
+
+    return check
+
+
+def _grid_lines(options: Mapping[str, Any], parameters: Mapping[str, Parameter] | None) -> list[InitErrorDetails]:
+    axes, lines, sizes = options["axes"], [], []
+    if not axes:
+        lines.append(refusal(("axes",), axes, "must hold at least one axis"))
+    for name, spec in axes.items():
+        if parameters is not None and name not in parameters:
+            lines.append(unknown(("axes", name), spec, parameters))
+            continue
+        try:
+            values = axis_values(spec, name)
+        except ArgumentError as error:
+            cure = f"; {error.instead}" if error.instead else ""
+            lines.append(refusal(("axes", name), spec, f"{error.allowed}{cure}"))
+            continue
+        sizes.append(len(values))
+        lines += _outside(name, spec, values.tolist(), parameters)
+    if math.prod(sizes) > LARGEST_GRID:
+        lines.append(refusal(("axes",), axes, f"{math.prod(sizes)} points; at most {LARGEST_GRID}", "sentence"))
+    return lines + _references(options, [name for name in axes if parameters is None or name in parameters])
+
+
+def _outside(
+    name: str, spec: Any, values: Sequence[float], parameters: Mapping[str, Parameter] | None
+) -> list[InitErrorDetails]:
+    outside = [value for value in values if parameters and not parameters[name].contains(value)]
+    if not parameters or not outside:
+        return []
+    but = "" if isinstance(spec, int | float) else f", but holds {outside[0]:g}"
+    return [refusal(("axes", name), spec, f"{parameters[name].allowed}{but}")]
+
+
+def _references(options: Mapping[str, Any], axes: Sequence[str]) -> list[InitErrorDetails]:
+    """Errors of `slice` and `baseline`, which name axes."""
+    baseline, slice_ = options["baseline"], options["slice"]
+    lines = [unknown(("baseline", name), value, axes) for name, value in baseline.items() if name not in axes]
+    if slice_ is not None and slice_ not in axes:
+        lines.append(refusal(("slice",), slice_, f"must be null or one of the axes ({', '.join(axes)})"))
+    return lines

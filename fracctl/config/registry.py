@@ -1,0 +1,89 @@
+"""What ``type: name`` in a configuration stands for: built in, or from an installed package through an entry point.
+
+An extension declares, for instance::
+
+    [project.entry-points."fracctl.plants"]
+    my_plant = "my_package.plants:MyPlant"
+
+and `type: my_plant` works wherever `hcw` does. The options are the arguments of the class, with their annotations and
+defaults; an `ArgumentError` from the constructor is reported under the option's name. A survey is called with the
+keyword `parameters` (the controller's configured values) besides its options.
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Mapping
+from functools import cache
+from importlib import metadata
+from typing import Any
+
+from fracctl.errors import ConfigurationError, suggestion
+
+BUILT_IN: Mapping[str, Mapping[str, str]] = {
+    "plants": {
+        "hcw": "fracctl.plants:HCW",
+        "hcw_in_plane": "fracctl.plants:HCWInPlane",
+        "hcw_out_of_plane": "fracctl.plants:HCWOutOfPlane",
+        "linear": "fracctl.plants:LinearPlant",
+    },
+    "controllers": {"pd": "fracctl.controllers.pd:PD", "pd_alpha": "fracctl.controllers:PDAlpha"},
+    "solvers": {"contour": "fracctl.solvers:Contour"},
+    "measures": {
+        "settling_time": "fracctl.measures:SettlingTime",
+        "overshoot": "fracctl.measures:Overshoot",
+        "control_effort": "fracctl.measures:ControlEffort",
+    },
+    "surveys": {"single": "fracctl.surveys:Single", "grid": "fracctl.surveys:Grid"},
+    "conf": {},
+}
+"""Kind, then name, to ``module:attribute``."""
+
+
+def names(kind: str) -> tuple[str, ...]:
+    """All names of a kind, e.g. of `plants`: the built-in ones, then those of extensions."""
+    return (*BUILT_IN[kind], *sorted(set(entry_points(kind)) - set(BUILT_IN[kind])))
+
+
+def load(kind: str, name: str) -> Any:
+    """Import what a name stands for.
+
+    Raises:
+        ConfigurationError: there is no such name, two packages claim it, or an extension cannot be imported.
+    """
+    extensions = entry_points(kind)
+    if name in BUILT_IN[kind]:
+        if name in extensions:
+            raise ConfigurationError(f"{_owner(extensions[name])} calls one of its {kind} '{name}', which is built in")
+        module, _, attribute = BUILT_IN[kind][name].partition(":")
+        return getattr(importlib.import_module(module), attribute)
+    if name not in extensions:
+        known = ", ".join(names(kind))
+        raise ConfigurationError(f"must be one of {known}{suggestion(name, names(kind))}")
+    return load_entry_point(kind, name)
+
+
+def load_entry_point(kind: str, name: str) -> Any:
+    """Import an extension's object; whatever the import raises becomes a ConfigurationError."""
+    entry = entry_points(kind)[name]
+    try:
+        return entry.load()
+    except Exception as error:
+        reason = f"{type(error).__name__}: {error}"
+        raise ConfigurationError(f"{_owner(entry)}: '{entry.value}' cannot be imported ({reason})") from error
+
+
+@cache
+def entry_points(kind: str) -> Mapping[str, metadata.EntryPoint]:
+    """Extensions of a kind by name."""
+    found: dict[str, metadata.EntryPoint] = {}
+    for entry in metadata.entry_points(group=f"fracctl.{kind}"):
+        if entry.name in found and entry.value != found[entry.name].value:
+            owners = f"{_owner(found[entry.name])} and {_owner(entry)}"
+            raise ConfigurationError(f"{owners} both call one of their {kind} '{entry.name}'")
+        found[entry.name] = entry
+    return found
+
+
+def _owner(entry: metadata.EntryPoint) -> str:
+    return f"package '{entry.dist.name}'" if entry.dist else "an installed package"

@@ -1,0 +1,159 @@
+"""The schema of a run: what a configuration holds, with every error found at once."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, BeforeValidator, Field, PlainValidator, SerializeAsAny, ValidationInfo
+from pydantic_core import InitErrorDetails
+
+from fracctl.config import parts
+from fracctl.config.fields import Folder, Name, Number, Strict, Whole, refusal, refuse
+from fracctl.errors import suggestion
+
+_COLUMN = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+
+
+class SingleSurvey(Strict):
+    """One design point: the controller as it stands."""
+
+    type: Literal["single"]
+
+
+class GridSurvey(Strict):
+    """The product of axes."""
+
+    type: Literal["grid"]
+    axes: dict[str, Any]
+    """``start:stop:step``, a number, or a list of values, by design variable."""
+    slice: str | None = None
+    """The design variable for each value of which an optimum is stored."""
+    baseline: dict[str, Number] = {}
+    """Values that the point has with which the optimum is compared."""
+
+
+class SerialScheduler(Strict):
+    """Everything in the calling process."""
+
+    type: Literal["serial"] = "serial"
+
+
+class LocalScheduler(Strict):
+    """Worker processes on this machine."""
+
+    type: Literal["local"] = "local"
+    workers: Annotated[Whole, Field(ge=1)] | None = None
+    """How many; None for one a core."""
+
+
+class Figure(Strict):
+    """One figure of the run."""
+
+    type: Literal["gain_contours", "trajectories", "objective_against_order"]
+    objective: str | None = None
+    """Whose optima are shown; None for the primary one."""
+    initial_conditions: list[str] | None = None
+    """Which are shown; None for all."""
+
+
+SURVEYS: Mapping[str, type[Strict]] = {"single": SingleSurvey, "grid": GridSurvey}
+SCHEDULERS: Mapping[str, type[Strict]] = {"serial": SerialScheduler, "local": LocalScheduler}
+
+
+def _survey(value: Any, info: ValidationInfo) -> Strict:
+    return parts.survey(value, info, SURVEYS)
+
+
+def _scheduler(value: Any) -> Strict:
+    given = parts.plain(value)
+    name = given.get("type") if isinstance(given, Mapping) else None
+    if name not in SCHEDULERS:
+        hint = suggestion(str(name), SCHEDULERS)
+        raise refuse(refusal(("type",), name, f"must be one of {', '.join(SCHEDULERS)}{hint}"))
+    return SCHEDULERS[str(name)].model_validate(given)
+
+
+def _objectives(value: dict[str, list[str]], info: ValidationInfo) -> dict[str, list[str]]:
+    columns = parts.measure_columns(info.data["measures"]) if "measures" in info.data else None
+    lines = []
+    for name, factors in value.items():
+        if not _COLUMN.fullmatch(name):
+            lines.append(refusal((name,), factors, "an objective's name consists of letters, digits and '_'", "sentence"))
+        if not factors:
+            lines.append(refusal((name,), factors, "must name at least one measure"))
+        for factor in factors:
+            if columns is not None and factor not in columns:
+                allowed = f"must name measures of this run ({', '.join(columns)}){suggestion(factor, columns)}"
+                lines.append(refusal((name,), factors, allowed))
+    if not value:
+        lines.append(refusal((), value, "must hold at least one objective"))
+    if lines:
+        raise refuse(*lines)
+    return value
+
+
+def _objective(value: str, info: ValidationInfo) -> str:
+    lines = _absent("objectives", value, (), info)
+    if lines:
+        raise refuse(*lines)
+    return value
+
+
+def _figures(value: dict[str, Figure], info: ValidationInfo) -> dict[str, Figure]:
+    lines = []
+    for name, figure in value.items():
+        if figure.objective is not None:
+            lines += _absent("objectives", figure.objective, (name, "objective"), info)
+        for condition in figure.initial_conditions or ():
+            lines += _absent("initial_condition", condition, (name, "initial_conditions"), info)
+    if lines:
+        raise refuse(*lines)
+    return value
+
+
+def _absent(field: str, name: str, path: tuple[str, ...], info: ValidationInfo) -> list[InitErrorDetails]:
+    """An error if a field has no entry of this name."""
+    known = list(info.data.get(field, [name]))
+    what = "objectives" if field == "objectives" else "initial conditions"
+    allowed = f"must be one of the run's {what} ({', '.join(known)})"
+    return [] if name in known else [refusal(path, name, allowed)]
+
+
+Part = SerializeAsAny[Strict]
+
+
+class RunConfig(Strict):
+    """One run. `model_dump(mode="json")` is plain data from which `model_validate` gives the same object."""
+
+    plant: Annotated[Part, PlainValidator(parts.registered)]
+    """`type` and the options of the plant."""
+    controller: Annotated[Part, PlainValidator(parts.controller)]
+    """`type` and the parameters of the law, which are columns of the tables."""
+    initial_condition: Annotated[
+        dict[Name, Annotated[Part, PlainValidator(parts.initial_condition)]], Field(min_length=1)
+    ]
+    """`units` and values of the states, by name."""
+    solver: Annotated[Part, PlainValidator(parts.registered)]
+    """`type` and the options of the solver."""
+    measures: Annotated[dict[str, Part], PlainValidator(parts.measures)]
+    """Options of the measures, by name."""
+    objectives: Annotated[dict[str, list[str]], AfterValidator(_objectives)]
+    """Measure columns by the name of the objective that is their geometric mean."""
+    objective: Annotated[str, AfterValidator(_objective)]
+    """The primary one."""
+    survey: Annotated[Part, PlainValidator(_survey)]
+    """Which design points are evaluated."""
+    scheduler: Annotated[Part, PlainValidator(_scheduler)] = SerialScheduler()
+    """Where."""
+    figures: Annotated[dict[Name, Figure], AfterValidator(_figures)] = {}
+    """By file name."""
+    horizon_periods: Annotated[Number, Field(gt=0.0)] = 6.0
+    """Simulated time in units of 2π."""
+    name: Name = "custom"
+    """Folder of the runs in `output_dir`."""
+    output_dir: Folder = "outputs"
+    """Relative to the current directory."""
+    seed: Annotated[Whole, Field(ge=0)] = 0
+    """Of everything random."""
