@@ -57,7 +57,7 @@ def test_nothing_tracked_belongs_to_one_machine(pattern: str) -> None:
 def test_the_patterns_see_what_they_look_for() -> None:
     for text in ("open('/" + "home/me/x')", "cd /" + "work/main", "see /" + "root/x"):
         assert re.search(MACHINE_PATHS, text)
-    for text in ("https://" + "pypi" + ".org/project/x", "pip install --" + "index-url=x"):
+    for text in ("https://" + "pypi" + ".org/project/x", "pip install --index" + "-url=x"):
         assert re.search(INDEX_ADDRESSES, text)
 
 

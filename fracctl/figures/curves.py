@@ -1,0 +1,77 @@
+"""Stored trajectories as curves that can be read at any time."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from scipy.interpolate import CubicHermiteSpline
+
+from fracctl.arrays import Floats
+from fracctl.figures.results import FigureError, Results, Row, Selection, optimum, same_point
+
+
+@dataclass(frozen=True)
+class Curve:
+    """The trajectory of one optimum."""
+
+    kind: str
+    """baseline or overall."""
+    best: Row
+    """The row of optima."""
+    samples: pd.DataFrame
+    """The rows of its trajectory, in the order of time."""
+    components: tuple[str, ...]
+    """Names of the positions."""
+
+    @property
+    def times(self) -> Floats:
+        """Times of the samples."""
+        return self.samples["time"].to_numpy(float)
+
+    @property
+    def settling_time(self) -> float:
+        """The settling time, infinite where it was not reached or not measured."""
+        return float(self.best.get("settling_time", math.inf))
+
+    def values(self, column: str, times: Floats) -> Floats:
+        """A state or a control at any times; positions by cubic Hermite interpolation with their rates."""
+        samples = self.samples[column].to_numpy(float)
+        if f"{column}_dot" not in self.samples:
+            return np.asarray(np.interp(times, self.times, samples))
+        rates = self.samples[f"{column}_dot"].to_numpy(float)
+        return np.asarray(CubicHermiteSpline(self.times, samples, rates)(times), dtype=float)
+
+    def last_to_settle(self, threshold: float) -> str | None:
+        """The position that crosses the threshold at the settling time, None where there is no such time."""
+        if not math.isfinite(self.settling_time):
+            return None
+        time = np.array([self.settling_time])
+        distances = {name: abs(abs(self.values(name, time)[0]) - threshold) for name in self.components}
+        return min(distances, key=distances.__getitem__)
+
+    def last_time_above(self, component: str, level: float) -> float:
+        """Time of the last sample above a level, 0 if none is."""
+        above = np.flatnonzero(np.abs(self.values(component, self.times)) > level)
+        return float(self.times[above[-1]]) if above.size else 0.0
+
+
+def curves_of(results: Results, selection: Selection, initial_condition: str) -> list[Curve]:
+    """Return the curves of baseline and overall optimum, only one where they are the same point.
+
+    Raises:
+        FigureError: neither has a stored trajectory.
+    """
+    curves: list[Curve] = []
+    for kind in ("baseline", "overall"):
+        best = optimum(results, selection, initial_condition, kind)
+        if best is None or any(same_point(best, curve.best) for curve in curves):
+            continue
+        samples = results.trajectories[results.trajectories["run"] == best["run"]].sort_values("time")
+        if not samples.empty:
+            curves.append(Curve(kind, best, samples, results.components))
+    if not curves:
+        raise FigureError(f"no trajectory of an optimum of {selection.objective} is stored for '{initial_condition}'")
+    return curves

@@ -1,0 +1,93 @@
+"""Columns, objectives and controllers as a reader meets them: symbols, words and units."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+_MEASURES = {
+    "settling_time": ("Settling time", r"\mathrm{ST}"),
+    "overshoot": ("Overshoot", r"\mathrm{OS}"),
+    "control_effort": ("Control effort", "U"),
+}
+_PREFIXES = {"alpha": r"\alpha_{%s}", "k_p": "k_{P_{%s}}", "k_d": "k_{D_{%s}}", "control": r"\upsilon_{%s}"}
+
+_LENGTHS = ((1e3, "km"), (1.0, "m"), (1e-3, "mm"))
+_ACCELERATIONS = ((1.0, "m/s²"), (1e-3, "mm/s²"), (1e-6, "µm/s²"))
+
+
+def symbol(column: str) -> str:
+    """Symbol of a column, for use between dollar signs: ``k_p_w`` is k_{P_w}, ``w_dot`` is w'."""
+    if column in _MEASURES:
+        return _MEASURES[column][1]
+    for prefix, form in _PREFIXES.items():
+        if column.startswith(f"{prefix}_"):
+            return form % _upright(column.removeprefix(f"{prefix}_"))
+    if column.endswith("_dot"):
+        return f"{_upright(column.removesuffix('_dot'))}'"
+    return _upright(column)
+
+
+def objective(columns: Sequence[str]) -> str:
+    """An objective in words: a measure's name, or the geometric mean of several."""
+    if len(columns) == 1:
+        words, sign = _MEASURES.get(columns[0], (_sentence(columns[0]), ""))
+        return f"{words} ${sign}$" if sign else words
+    product = r"\cdot ".join(symbol(column) for column in columns)
+    return rf"$({product})^{{1/{len(columns)}}}$"
+
+
+def initial_condition(name: str) -> str:
+    """``ic1`` is IC1; other names lose their underscores."""
+    return name.upper() if re.fullmatch(r"ic\d+", name) else name.replace("_", " ")
+
+
+def controller(row: Mapping[str, Any]) -> str:
+    """The law of a row of optima, e.g. PD^α with α_w = 0.91; its gains too where there are but two."""
+    orders = [name for name in row if name.startswith("alpha_")]
+    gains = [name for name in row if name.startswith(("k_p_", "k_d_"))]
+    law = "PD" if all(row[name] == 1.0 for name in orders) else r"PD$^{\alpha}$"
+    shown = orders + (gains if len(gains) <= 2 else [])
+    return f"{law}: " + ", ".join(f"${symbol(name)} = {row[name]:g}$" for name in shown)
+
+
+def power_of_ten(largest: float) -> tuple[float, str]:
+    """Power of ten that divides an axis into handy numbers, and what its label then says; 1 from 0.1 to 1000."""
+    if largest == 0.0 or 0.1 <= largest < 1e3 or not math.isfinite(largest):
+        return 1.0, ""
+    exponent = math.floor(math.log10(largest))
+    return 10.0**exponent, rf"$\,/\,10^{{{exponent}}}$"
+
+
+def number(value: float) -> str:
+    """A number for use between dollar signs, small and large ones as a power of ten."""
+    mantissa, exponent = f"{value:e}".split("e")
+    if -3 <= int(exponent) <= 4:
+        return f"{value:g}"
+    factor = f"{float(mantissa):g}"
+    return ("" if factor == "1" else rf"{factor}\times ") + f"10^{{{int(exponent)}}}"
+
+
+def length_unit(largest_m: float) -> tuple[float, str]:
+    """Metres in the unit that suits a length, and its name."""
+    return _unit(largest_m, _LENGTHS)
+
+
+def acceleration_unit(largest_m_s2: float) -> tuple[float, str]:
+    """m/s² in the unit that suits an acceleration, and its name."""
+    return _unit(largest_m_s2, _ACCELERATIONS)
+
+
+def _unit(largest: float, ladder: Sequence[tuple[float, str]]) -> tuple[float, str]:
+    return next(((size, name) for size, name in ladder if largest >= size), ladder[-1])
+
+
+def _upright(name: str) -> str:
+    return name if len(name) <= 2 else rf"\mathrm{{{name.replace('_', ' ')}}}".replace(" ", r"\ ")
+
+
+def _sentence(name: str) -> str:
+    words = name.replace("_", " ")
+    return words[:1].upper() + words[1:]

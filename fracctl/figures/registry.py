@@ -1,0 +1,84 @@
+"""Figure types by name, and the call that draws a run's figures."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+from matplotlib.figure import Figure
+
+from fracctl.errors import ConfigurationError, FracctlError, suggestion
+from fracctl.figures import gain_contours, objective_against_order, trajectories
+from fracctl.figures.results import FigureError, Results, Selection, select
+from fracctl.figures.style import render, style
+from fracctl.store import RunDirectory
+from fracctl.store.files import make_directory, write_bytes
+
+TYPES: Mapping[str, Callable[[Results, Selection], tuple[Figure, pd.DataFrame]]] = {
+    "gain_contours": gain_contours.build,
+    "trajectories": trajectories.build,
+    "objective_against_order": objective_against_order.build,
+}
+"""Type in the configuration to the function that makes the figure and the table behind it."""
+
+
+@dataclass(frozen=True)
+class _Request:
+    name: str
+    build: Callable[[Results, Selection], tuple[Figure, pd.DataFrame]]
+    selection: Selection
+
+
+def draw(run: RunDirectory, figures: Mapping[str, Mapping[str, Any]]) -> list[Path]:
+    """Draw figures of a stored run: ``<name>.pdf``, ``<name>.png`` and the table behind them, ``<name>.csv``.
+
+    Args:
+        run: the run directory; nothing else is read.
+        figures: file name to type and options, as in the configuration's `figures`.
+
+    Returns:
+        The files written.
+
+    Raises:
+        ConfigurationError: a type or an option is unknown.
+        FigureError: the run does not hold what a figure shows; the other figures are written all the same.
+    """
+    results = Results(run)
+    written: list[Path] = []
+    problems: list[FracctlError] = []
+    for request in [_request(results, name, options) for name, options in figures.items()]:
+        try:
+            written += _files(run.figures, request, results)
+        except FigureError as problem:
+            problems.append(FigureError(f"figure '{request.name}': {problem}"))
+    if problems:
+        raise FigureError("\n".join(str(problem) for problem in problems))
+    return written
+
+
+def _request(results: Results, name: str, options: Mapping[str, Any]) -> _Request:
+    others = {key: value for key, value in options.items() if key != "type"}
+    kind = str(options.get("type"))
+    if kind not in TYPES:
+        known = f"must be one of {', '.join(TYPES)}"
+        raise ConfigurationError(f"figures.{name}.type = {kind}: {known}{suggestion(kind, TYPES)}")
+    try:
+        return _Request(name, TYPES[kind], select(results, others))
+    except ConfigurationError as problem:
+        raise ConfigurationError(f"figures.{name}: {problem}") from None
+
+
+def _files(folder: Path, request: _Request, results: Results) -> list[Path]:
+    with style():
+        figure, table = request.build(results, request.selection)
+        contents = render(figure)
+    contents["csv"] = table.to_csv(index=False, lineterminator="\n").encode()
+    make_directory(folder)
+    paths = []
+    for kind, content in contents.items():
+        paths.append(folder / f"{request.name}.{kind}")
+        write_bytes(paths[-1], content)
+    return paths

@@ -1,0 +1,158 @@
+"""What the figures read: the tables of a run directory, and the part of them that one figure shows."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import pandas as pd
+
+from fracctl.errors import ConfigurationError, RunError, suggestion
+from fracctl.plants import Chief
+from fracctl.store import RunDirectory
+from fracctl.units import Scales
+
+Row = Mapping[str, Any]
+"""A row of optima, by column."""
+
+
+class FigureError(RunError):
+    """A figure cannot be drawn from what the run holds."""
+
+
+@dataclass(frozen=True)
+class Results:
+    """The tables of one run, read when first asked for."""
+
+    run: RunDirectory
+
+    @cached_property
+    def configuration(self) -> dict[str, Any]:
+        """The run's resolved configuration."""
+        configuration: dict[str, Any] = self.run.run_json["configuration"]
+        return configuration
+
+    @cached_property
+    def evaluations(self) -> pd.DataFrame:
+        """All evaluated points."""
+        return self.run.evaluations()
+
+    @cached_property
+    def optima(self) -> pd.DataFrame:
+        """Optima by kind: slice, overall, baseline; the row's number is the `run` of a trajectory."""
+        return self.run.optima()
+
+    @cached_property
+    def trajectories(self) -> pd.DataFrame:
+        """States and controls of the points that figures show."""
+        return self.run.trajectories()
+
+    @cached_property
+    def components(self) -> tuple[str, ...]:
+        """Names of the controlled positions."""
+        columns = map(str, self.trajectories.columns)
+        return tuple(name.removeprefix("control_") for name in columns if name.startswith("control_"))
+
+    @property
+    def slice_variable(self) -> str | None:
+        """The design variable by whose values a grid is cut into slices."""
+        name: str | None = self.configuration["survey"].get("slice")
+        return name
+
+    @cached_property
+    def varied(self) -> tuple[str, ...]:
+        """Design variables, the slices' apart, of which the table holds more than one value."""
+        axes = self.configuration["survey"].get("axes", {})
+        return tuple(name for name in axes if name != self.slice_variable and self.evaluations[name].nunique() > 1)
+
+    @property
+    def horizon_periods(self) -> float:
+        """Length of each trajectory in periods 2π."""
+        return float(self.configuration["horizon_periods"])
+
+    @property
+    def threshold(self) -> float | None:
+        """Half width δ of the band of the settling time; None where it is not measured."""
+        measure = self.configuration["measures"].get("settling_time")
+        return None if measure is None else float(measure["threshold"])
+
+    @property
+    def period_name(self) -> str:
+        """What 2π of the dimensionless time is called."""
+        return "orbits" if self._plant["type"].startswith("hcw") else "periods $2\\pi$"
+
+    @cached_property
+    def scales(self) -> Scales | None:
+        """Lengths and times in SI units, where the plant has them."""
+        if self._plant["type"].startswith("hcw"):
+            return Chief(**self._plant.get("chief", {})).scales
+        given = self._plant.get("scales")
+        return None if given is None else Scales(**given)
+
+    @property
+    def _plant(self) -> dict[str, Any]:
+        plant: dict[str, Any] = self.configuration["plant"]
+        return plant
+
+
+@dataclass(frozen=True)
+class Selection:
+    """The objective and the initial conditions that a figure shows."""
+
+    objective: str
+    """Name of the objective."""
+    columns: tuple[str, ...]
+    """Measures whose geometric mean it is."""
+    initial_conditions: tuple[str, ...]
+    """Names, in the order of the rows of the figure."""
+
+    @property
+    def value_column(self) -> str:
+        """Column of the objective in evaluations and optima."""
+        return f"objective_{self.objective}"
+
+
+def select(results: Results, options: Mapping[str, Any]) -> Selection:
+    """Read the options `objective` (default: the primary one) and `initial_conditions` (default: all).
+
+    Raises:
+        ConfigurationError: an option or a name is unknown.
+    """
+    for key in options:
+        if key not in ("objective", "initial_conditions"):
+            raise ConfigurationError(f"unknown option '{key}'{suggestion(key, ('objective', 'initial_conditions'))}")
+    objectives = results.configuration["objectives"]
+    objective = options.get("objective") or results.configuration["objective"]
+    _known("objective", [objective], objectives)
+    present = list(results.configuration["initial_condition"])
+    asked = options.get("initial_conditions") or present
+    _known("initial condition", asked, present)
+    return Selection(objective, tuple(objectives[objective]), tuple(asked))
+
+
+def optimum(results: Results, selection: Selection, initial_condition: str, kind: str) -> Row | None:
+    """Return the row of optima of this kind (overall, baseline) with its number as `run`, None if there is none."""
+    rows = chosen(results.optima, selection, initial_condition, kind)
+    if rows.empty:
+        return None
+    return {"run": rows.index[0]} | {str(name): value for name, value in rows.iloc[0].items()}
+
+
+def chosen(optima: pd.DataFrame, selection: Selection, initial_condition: str, kind: str) -> pd.DataFrame:
+    """Rows of optima of one kind for the selected objective and one initial condition."""
+    objective = optima["objective_name"] == selection.objective
+    return optima[objective & (optima["initial_condition"] == initial_condition) & (optima["kind"] == kind)]
+
+
+def same_point(first: Row, second: Row) -> bool:
+    """Whether two rows are the same design point."""
+    names = [name for name in first if name.startswith(("alpha_", "k_p_", "k_d_"))]
+    return all(first[name] == second[name] for name in names)
+
+
+def _known(what: str, names: Sequence[str], known: Mapping[str, Any] | Sequence[str]) -> None:
+    for name in names:
+        if name not in known:
+            raise ConfigurationError(f"the run has no {what} '{name}'{suggestion(name, known)}")
