@@ -20,7 +20,7 @@ import mpmath
 import numpy as np
 from numpy.typing import NDArray
 
-from tests.references.loops import Loop
+from tests.references.loops import Floats, Loop
 
 Complexes = NDArray[np.complex128]
 NEAR_ZERO = -45.0
@@ -91,15 +91,47 @@ def pole_bound(loop: Loop) -> float:
     return bound
 
 
-def argument_change(loop: Loop, path: Callable[[Any], Complexes], step: float = 0.2) -> float:
-    """Return the change of arg det M along z = path(p), 0 ≤ p ≤ 1, halving steps until arg moves less than `step`."""
+def magnitude_bounds(loop: Loop, radius: Floats) -> tuple[Floats, Floats]:
+    """Return bounds on |det M| and |d det M/dz|, z = log σ, for |σ| ≤ radius: sums of magnitudes of all powers."""
+    m = range(loop.size)
+    identity, damping, fractional = np.eye(loop.size), np.abs(loop.damping), np.abs(loop.k_d)
+    constant = np.abs(loop.k_p - loop.stiffness)
+    powers = [radius**a for a in loop.alpha]
+    size = [
+        [identity[i, j] * radius**2 + damping[i, j] * radius + constant[i, j] + fractional[i, j] * powers[j] for j in m]
+        for i in m
+    ]
+    slope = [
+        [
+            2.0 * identity[i, j] * radius**2 + damping[i, j] * radius + loop.alpha[j] * fractional[i, j] * powers[j]
+            for j in m
+        ]
+        for i in m
+    ]
+    if loop.size == 1:
+        return size[0][0], slope[0][0]
+    diagonal = slope[0][0] * size[1][1] + size[0][0] * slope[1][1]
+    off_diagonal = slope[0][1] * size[1][0] + size[0][1] * slope[1][0]
+    return size[0][0] * size[1][1] + size[0][1] * size[1][0], diagonal + off_diagonal
+
+
+def argument_change(loop: Loop, path: Callable[[Floats], Complexes]) -> float:
+    """Return the change of arg det M along the straight line z = path(p), 0 ≤ p ≤ 1.
+
+    A step is halved until the bound on the slope of det M proves that it stays nearer to the value at one end of the
+    step than to 0 on each half of it, so no turn can be missed.
+    """
     p = np.linspace(0.0, 1.0, 401)
     values = characteristic(loop, path(p))
     for _ in range(60):
-        change = np.angle(values[1:] / values[:-1])
-        wide = np.flatnonzero(np.abs(change) > step)
+        z = path(p)
+        magnitude, slope = magnitude_bounds(loop, np.exp(np.maximum(z.real[1:], z.real[:-1])))
+        nearest = np.minimum(np.abs(values[1:]), np.abs(values[:-1]))
+        if np.any(nearest < 1e-13 * magnitude):
+            break
+        wide = np.flatnonzero(0.5 * np.abs(np.diff(z)) * slope > 0.7 * nearest)
         if not wide.size:
-            return float(change.sum())
+            return float(np.angle(values[1:] / values[:-1]).sum())
         middle = 0.5 * (p[wide] + p[wide + 1])
         p = np.insert(p, wide + 1, middle)
         values = np.insert(values, wide + 1, characteristic(loop, path(middle)))

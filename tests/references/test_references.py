@@ -193,3 +193,10 @@ def test_measures_of_a_damped_oscillator_in_closed_form() -> None:
     assert abs(x) == pytest.approx(0.9 * peak, rel=1e-12)
     assert np.pi / damped < settled < 1.5 * np.pi / damped
     assert measures.sampled_settling_time(0.9 * peak) == pytest.approx(np.floor(settled * 100) / 100)
+
+
+@pytest.mark.parametrize("k_d", [1e-2, -1e-2, -1e-5])
+def test_counts_see_two_pole_pairs_close_to_the_axis_and_to_each_other(k_d: float) -> None:
+    """Two equal oscillators: det M is a square and its argument turns by 2π within |k_D| of ω = 1."""
+    loop = loops.Loop(-np.eye(2), np.zeros((2, 2)), np.zeros((2, 2)), k_d * np.eye(2), np.array([0.9, 0.9]), np.ones(4))
+    assert poles.unstable_count(loop) == (0 if k_d > 0 else 4)
