@@ -20,6 +20,7 @@ BOTTOM_UP = (
     "loop",
     "characteristic",
     "panels",
+    "features",
     "trajectory",
     "solvers",
     "stability",
