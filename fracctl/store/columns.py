@@ -67,12 +67,12 @@ def _to_arrow(values: Array | None, kind: pa.DataType, n_rows: int) -> pa.Array:
 
 
 def to_rows(table: pa.Table) -> dict[str, Array]:
-    """Return a table as arrays; words and verdicts become objects, nulls None (NaN in numbers)."""
+    """Return a table as arrays; words and verdicts become objects, nulls None."""
     return {name: _to_numpy(table.column(name)) for name in table.column_names}
 
 
 def _to_numpy(column: pa.ChunkedArray) -> Array:
-    if column.type in (pa.string(), pa.bool_()):
+    if column.type in (pa.string(), pa.bool_()) or (column.null_count and pa.types.is_integer(column.type)):
         objects = np.empty(len(column), dtype=object)
         objects[:] = column.to_pylist()
         return objects

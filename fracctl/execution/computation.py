@@ -1,0 +1,157 @@
+"""Computing one run: blocks, tables, trajectories, figures, summary, manifest."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fracctl.errors import RunError
+from fracctl.execution.drawing import draw_figures
+from fracctl.execution.executors import make_executor, n_workers
+from fracctl.execution.progress import Progress
+from fracctl.execution.record import Record, run_log
+from fracctl.execution.row_store import RowStore, counters, evaluations_schema
+from fracctl.execution.scheduler import Scheduler
+from fracctl.execution.summary import Tally, notes_on, results, summarise
+from fracctl.execution.worker import Work, describe
+from fracctl.store.columns import schema
+from fracctl.store.files import remove_tree
+from fracctl.store.identity import canonical_json
+from fracctl.store.run_directory import RunDirectory
+from fracctl.surveys import Optima, Survey
+
+TRAJECTORY_SAMPLES = 2001
+"""Times in ``trajectories.parquet``, uniform from 0 to the horizon."""
+TRAJECTORY_KINDS = ("overall", "baseline")
+
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Job:
+    """What a run computes."""
+
+    configuration: Mapping[str, Any]
+    """Plain data; `name`, `output_dir`, `scheduler`, `figures` and `seed` are read, the rest is recorded."""
+    work: Work
+    """The evaluation."""
+    survey: Callable[[], Survey]
+    """Makes the survey."""
+
+
+class Computation:
+    """One run on its way to being finished.
+
+    Args:
+        job: what to compute.
+        directory: where; what it holds already is not computed again.
+        progress: is told.
+        notes: sentences for the summary.
+    """
+
+    def __init__(self, job: Job, directory: RunDirectory, progress: Progress, notes: list[str]) -> None:
+        self._job, self._directory, self._progress, self._notes = job, directory, progress, notes
+        self._evaluation = job.work.evaluation()
+        self._survey = job.survey()
+        self._scheduler = job.configuration["scheduler"]
+        self._workers = n_workers(self._scheduler, self._survey.n_points)
+        directory.create()
+        self._record = Record(directory, job.configuration, self._workers)
+        self._metadata = {
+            "fracctl.configuration": canonical_json(job.configuration),
+            "fracctl.provenance": canonical_json(self._record.provenance),
+        }
+
+    def run(self) -> None:
+        """Compute what is missing; afterwards the directory holds a finished or an incomplete run.
+
+        Raises:
+            RunError: nothing could be computed, or the disk is full or not writable.
+            KeyboardInterrupt: Ctrl-C; what was computed is kept.
+        """
+        with self._ending_recorded():
+            self._record.write("running")
+            with run_log(self._directory.log):
+                summary = self._compute()
+            self._record.write(summary["status"], summary, summary["error"])
+            self._directory.write_manifest()
+        if summary["status"] == "finished":
+            remove_tree(self._directory.parts)
+        self._directory.forget_aside()
+
+    @contextmanager
+    def _ending_recorded(self) -> Iterator[None]:
+        try:
+            yield
+        except BaseException as problem:
+            interrupted = isinstance(problem, KeyboardInterrupt)
+            with suppress(RunError):
+                if interrupted:
+                    self._record.write("interrupted")
+                else:
+                    self._record.write("failed", error=describe(problem))
+            raise
+
+    def _compute(self) -> dict[str, Any]:
+        store = self._evaluate()
+        tally, optima = self._tables(store)
+        self._trajectories()
+        found = results(self._evaluation, optima)
+        notes = self._notes + notes_on(found, self._survey.baseline, tally)
+        if store.damaged:
+            notes.append(f"stored parts that could not be trusted and were computed again: {store.damaged}")
+        notes += draw_figures(self._directory, self._job.configuration["figures"])
+        identity = {
+            "experiment": str(self._job.configuration["name"]),
+            "run_id": self._directory.path.name,
+            "run_directory": str(self._directory.path),
+        }
+        return summarise(identity, store, found, notes)
+
+    def _evaluate(self) -> RowStore:
+        store = RowStore(self._directory, self._evaluation, evaluations_schema(self._evaluation, self._metadata))
+        executor = make_executor(self._scheduler, self._survey.n_points)
+        in_flight = 2 * self._workers if self._workers > 1 else 1
+        scheduler = Scheduler(self._survey, executor, self._job.work, store, in_flight, self._progress.advance)
+        n_points, n_conditions = self._survey.n_points, len(self._evaluation.initial_conditions)
+        self._progress.start(None if n_points is None else n_points * n_conditions)
+        try:
+            scheduler.run()
+        finally:
+            self._progress.finish()
+            self._record.foreign_cpu_time_s = store.foreign_cpu_time_s
+        _log.info("%d blocks: %d were stored, %d failed", len(store.numbers), store.continued, len(store.failures))
+        if len(store.failures) == len(store.numbers):
+            raise RunError(f"every point failed: {next(iter(store.failures.values()), 'there is none')}")
+        return store
+
+    def _tables(self, store: RowStore) -> tuple[Tally, list[dict[str, Any]]]:
+        """Join the parts, select the optima, and return them."""
+        evaluation = self._evaluation
+        table = evaluations_schema(evaluation, self._metadata)
+        self._directory.write_evaluations(table, store.tables())
+        tally = Tally()
+        selection = Optima(
+            evaluation.objectives, evaluation.design_variables, self._survey.slice, self._survey.baseline
+        )
+        for rows in self._directory.stream_evaluations():
+            tally.add(rows)
+            selection.add(rows)
+        optima = selection.rows()
+        columns = ("kind", "slice", "objective_name", *table.names)
+        self._directory.write_optima(schema(columns, counters(evaluation), self._metadata), optima)
+        return tally, optima
+
+    def _trajectories(self) -> None:
+        optima = self._directory.optima()
+        shown = optima[optima["kind"].isin(TRAJECTORY_KINDS)]
+        rows = {"run": np.zeros(0, dtype=np.int64), "time": np.zeros(0)}
+        if len(shown):
+            times = np.linspace(0.0, self._evaluation.horizon, TRAJECTORY_SAMPLES)
+            rows = dict(self._evaluation.trajectories(shown, times))
+        self._directory.write_trajectories(schema(tuple(rows), metadata=self._metadata), rows)

@@ -1,0 +1,45 @@
+"""Where blocks run: in this process, or in processes of this machine."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping
+from concurrent.futures import Executor, Future
+from typing import Any, ParamSpec, TypeVar
+
+from fracctl.execution.processes import ProcessExecutor
+
+_P = ParamSpec("_P")
+_T = TypeVar("_T")
+
+
+class InProcessExecutor(Executor):
+    """Runs every call at once, where it is submitted."""
+
+    def submit(self, fn: Callable[_P, _T], /, *args: _P.args, **kwargs: _P.kwargs) -> Future[_T]:
+        """Run the call and return its finished future."""
+        future: Future[_T] = Future()
+        try:
+            future.set_result(fn(*args, **kwargs))
+        except Exception as problem:  # noqa: BLE001 - an executor hands every exception to its future
+            future.set_exception(problem)
+        return future
+
+
+def n_workers(scheduler: Mapping[str, Any], n_points: int | None) -> int:
+    """Return how many processes compute; 1 is this one. A single point is not worth another process."""
+    if scheduler["type"] == "serial" or n_points == 1:
+        return 1
+    return int(scheduler.get("workers") or n_cores())
+
+
+def n_cores() -> int:
+    """Return the number of cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def make_executor(scheduler: Mapping[str, Any], n_points: int | None) -> Executor:
+    """Return the executor of the configuration's `scheduler`."""
+    if scheduler["type"] == "serial" or n_points == 1:
+        return InProcessExecutor()
+    return ProcessExecutor(n_workers(scheduler, n_points))

@@ -1,0 +1,25 @@
+"""`fracctl.run`: an experiment by name, from Python."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from fracctl.config.compose import compose
+from fracctl.execution.run import RunResult, execute
+
+
+def run(experiment: str, overrides: Sequence[str] = (), *, config_dir: str | Path | None = None) -> RunResult:
+    """Run an experiment as the command line does; in this process unless `overrides` name a scheduler.
+
+    Args:
+        experiment: name, e.g. ``ic1_outofplane``.
+        overrides: as on the command line, e.g. ``["survey.axes.alpha_w=[0.91,1.0]"]``.
+        config_dir: a directory of your own configuration files.
+
+    Raises:
+        ConfigurationError: a key is unknown or a value out of range.
+        RunError: the run could not be computed or stored.
+    """
+    arguments = [f"experiment={experiment}", "scheduler=serial", *overrides]
+    return execute(compose(arguments, None if config_dir is None else Path(config_dir)))

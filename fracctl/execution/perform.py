@@ -1,0 +1,113 @@
+"""One run and its directory: compute it, continue it, or take it as it is stored."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from fracctl.execution.computation import Computation, Job
+from fracctl.execution.drawing import draw_figures
+from fracctl.execution.progress import NoProgress, Progress
+from fracctl.execution.threads import single_threaded
+from fracctl.store import RunDirectory
+from fracctl.store.files import make_directory, remove_tree
+from fracctl.store.identity import run_id
+from fracctl.store.lock import exclusive
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+@dataclass(frozen=True)
+class RunResult:
+    """A run that is stored."""
+
+    run_directory: Path
+    """Absolute."""
+    summary: dict[str, Any]
+    """As ``--json`` prints it."""
+
+    @property
+    def reused(self) -> bool:
+        """Whether it was there already and nothing was computed."""
+        return bool(self.summary["reused"])
+
+    @cached_property
+    def evaluations(self) -> pd.DataFrame:
+        """Every evaluated point, read at first use."""
+        return RunDirectory(self.run_directory).evaluations()
+
+    @cached_property
+    def optima(self) -> pd.DataFrame:
+        """The optima by kind, slice and objective, read at first use."""
+        return RunDirectory(self.run_directory).optima()
+
+
+def perform(job: Job, *, fresh: bool = False, progress: Progress | None = None) -> RunResult:
+    """Compute a job, or return it where it is stored already; continue it where it is unfinished.
+
+    Args:
+        job: what to compute.
+        fresh: compute again what is stored.
+        progress: is told how far the run is.
+
+    Raises:
+        RunError: it could not be computed or stored, or another process is computing it.
+        KeyboardInterrupt: Ctrl-C; what was computed is kept, and the next call continues from it.
+    """
+    directory = directory_of(job)
+    if not fresh and _is_whole(directory) and not _wants_other_figures(directory, job):
+        return _stored(directory)
+    make_directory(directory.path.parent)
+    with exclusive(directory.lock), single_threaded():
+        if fresh or not _is_whole(directory):
+            notes = _prepare(directory, fresh)
+            Computation(job, directory, progress or NoProgress(), notes).run()
+            return RunResult(directory.path, directory.run_json["summary"])
+        return _redrawn(directory, job)
+
+
+def directory_of(job: Job) -> RunDirectory:
+    """Return the run directory of a job."""
+    configuration = job.configuration
+    return RunDirectory(Path(configuration["output_dir"]) / configuration["name"] / run_id(configuration))
+
+
+def _is_whole(directory: RunDirectory) -> bool:
+    return directory.has_manifest and directory.status == "finished" and not directory.verify()
+
+
+def _prepare(directory: RunDirectory, fresh: bool) -> list[str]:
+    """Leave in the directory only what can be trusted, and return notes on what could not."""
+    damage = directory.verify() if directory.has_manifest else []
+    if fresh or damage:
+        directory.set_aside()
+    else:
+        directory.remove_manifest()
+    return [f"the stored run was damaged ({damage[0]}) and has been computed again"] if damage and not fresh else []
+
+
+def _stored(directory: RunDirectory) -> RunResult:
+    summary = directory.run_json["summary"] | {"reused": True, "run_directory": str(directory.path)}
+    return RunResult(directory.path, summary)
+
+
+def _wants_other_figures(directory: RunDirectory, job: Job) -> bool:
+    return bool(directory.run_json["configuration"]["figures"] != job.configuration["figures"])
+
+
+def _redrawn(directory: RunDirectory, job: Job) -> RunResult:
+    """Return a stored run with the figures asked for now."""
+    figures = job.configuration["figures"]
+    content = directory.run_json
+    content["configuration"]["figures"] = figures
+    remove_tree(directory.figures)
+    directory.write_run_json(content)
+    directory.write_manifest()
+    notes = draw_figures(directory, figures)
+    directory.write_manifest()
+    result = _stored(directory)
+    result.summary["notes"] += notes
+    return result

@@ -1,0 +1,34 @@
+"""How a run tells the outside how far it is."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+
+class Progress(Protocol):
+    """Told from the parent process only, in its main thread."""
+
+    def start(self, total_rows: int | None) -> None:
+        """Begin; `total_rows` is None where it is not known beforehand."""
+        ...
+
+    def advance(self, rows: int) -> None:
+        """So many further rows are stored."""
+        ...
+
+    def finish(self) -> None:
+        """End, also after a failure or an interruption."""
+        ...
+
+
+class NoProgress:
+    """Shows nothing."""
+
+    def start(self, total_rows: int | None) -> None:
+        """Ignore."""
+
+    def advance(self, rows: int) -> None:
+        """Ignore."""
+
+    def finish(self) -> None:
+        """Ignore."""

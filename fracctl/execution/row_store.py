@@ -1,0 +1,94 @@
+"""From what became of a block to rows of the table, and back."""
+
+from __future__ import annotations
+
+import logging
+import os
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+import pyarrow as pa
+
+from fracctl.arrays import Array
+from fracctl.execution.worker import Evaluator, Outcome
+from fracctl.store.columns import POINT, REASON, schema
+from fracctl.store.parts import Parts
+from fracctl.store.run_directory import RunDirectory
+from fracctl.surveys import Block
+from fracctl.surveys.base import Rows
+
+FAILED = "failed"
+"""Status of the points of a block that could not be computed."""
+
+_log = logging.getLogger(__name__)
+
+
+def evaluations_schema(evaluation: Evaluator, metadata: Mapping[str, str]) -> pa.Schema:
+    """Return the schema of ``evaluations.parquet``: `point`, the evaluation's columns, `reason`."""
+    return schema((POINT, *evaluation.row_columns, REASON), counters(evaluation), metadata)
+
+
+def counters(evaluation: Evaluator) -> tuple[str, ...]:
+    """Return the columns of counters: those that follow `error_estimate`."""
+    columns = evaluation.row_columns
+    return columns[columns.index("error_estimate") + 1 :]
+
+
+class RowStore:
+    """The parts of a run, written block by block."""
+
+    def __init__(self, directory: RunDirectory, evaluation: Evaluator, table: pa.Schema) -> None:
+        self._parts = Parts(directory.parts, table)
+        self._evaluation = evaluation
+        self.numbers: list[int] = []
+        """Blocks that are stored."""
+        self.failures: dict[int, str] = {}
+        """Blocks that could not be computed, with the reason."""
+        self.failed_points = 0
+        """Number of their points."""
+        self.continued = 0
+        """Number of blocks that were stored before."""
+        self.foreign_cpu_time_s = 0.0
+        """CPU time that other processes spent."""
+
+    @property
+    def damaged(self) -> int:
+        """Number of stored parts that could not be trusted."""
+        return self._parts.damaged
+
+    def load(self, block: Block) -> Rows | None:
+        """Return the rows of a block that was computed before, None if it is to be computed."""
+        rows = self._parts.load(block.number)
+        if rows is not None:
+            self.numbers.append(block.number)
+            self.continued += 1
+        return rows
+
+    def save(self, block: Block, outcome: Outcome) -> Rows:
+        """Store what became of a block and return its rows."""
+        rows = dict(outcome.rows) if outcome.rows is not None else self._failed_rows(block, str(outcome.reason))
+        n_conditions = len(self._evaluation.initial_conditions)
+        rows[POINT] = np.tile(np.arange(block.first_point, block.first_point + block.size), n_conditions)
+        self._parts.save(block.number, rows, outcome.reason)
+        self.numbers.append(block.number)
+        self.foreign_cpu_time_s += outcome.cpu_time_s if outcome.process != os.getpid() else 0.0
+        if outcome.reason is not None:
+            self.failures[block.number] = outcome.reason
+            self.failed_points += block.size
+            _log.error("block %d failed: %s\n%s", block.number, outcome.reason, outcome.trace)
+        return rows
+
+    def tables(self) -> Iterator[pa.Table]:
+        """Yield all parts in the order of their blocks."""
+        return self._parts.tables(sorted(self.numbers))
+
+    def _failed_rows(self, block: Block, reason: str) -> dict[str, Array]:
+        names = list(self._evaluation.initial_conditions)
+        n_rows = block.size * len(names)
+        rows: dict[str, Array] = {name: np.full(n_rows, np.nan) for name in self._evaluation.row_columns}
+        rows |= {name: np.full(n_rows, None, dtype=object) for name in ("stable", *counters(self._evaluation))}
+        rows |= {name: np.tile(values, len(names)) for name, values in block.design.items()}
+        rows["initial_condition"] = np.repeat(np.array(names, dtype=object), block.size)
+        rows["status"] = np.full(n_rows, FAILED, dtype=object)
+        rows[REASON] = np.full(n_rows, reason, dtype=object)
+        return rows

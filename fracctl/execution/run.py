@@ -1,0 +1,30 @@
+"""One run from its configuration; callable without a command line."""
+
+from __future__ import annotations
+
+from fracctl.config.build import build_evaluation, build_survey
+from fracctl.config.schemas import RunConfig
+from fracctl.execution.computation import Job
+from fracctl.execution.perform import RunResult, perform
+from fracctl.execution.progress import Progress
+from fracctl.execution.worker import Work
+
+__all__ = ["RunResult", "execute"]
+
+
+def execute(config: RunConfig, *, fresh: bool = False, progress: Progress | None = None) -> RunResult:
+    """Compute a run, or return it where it is stored already; continue it where it is unfinished.
+
+    Args:
+        config: what to compute and where to store it.
+        fresh: compute again what is stored.
+        progress: is told how far the run is.
+
+    Raises:
+        RunError: it could not be computed or stored, or another process is computing it.
+        KeyboardInterrupt: Ctrl-C; what was computed is kept, and the next call continues from it.
+    """
+    plain = config.model_dump(mode="json")
+    work = Work.of("fracctl.execution.configured:evaluation_of", plain)
+    job = Job(plain, work, lambda: build_survey(config, build_evaluation(config)))
+    return perform(job, fresh=fresh, progress=progress)

@@ -1,0 +1,142 @@
+"""One loop that takes a survey's blocks through an executor, whichever it is."""
+
+from __future__ import annotations
+
+import logging
+from collections import Counter, deque
+from collections.abc import Callable
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
+from typing import Protocol
+
+from fracctl.errors import RunError
+from fracctl.execution.processes import WorkerLost
+from fracctl.execution.worker import Outcome, Work, describe, evaluate
+from fracctl.surveys import Block, Survey
+from fracctl.surveys.base import Rows
+
+ATTEMPTS = 3
+"""How often a block is tried whose worker dies; then its points are failed."""
+
+_log = logging.getLogger(__name__)
+
+
+class BlockStore(Protocol):
+    """Where rows are kept."""
+
+    def load(self, block: Block) -> Rows | None:
+        """Return the rows of a block that is stored, None if it is to be computed."""
+        ...
+
+    def save(self, block: Block, outcome: Outcome) -> Rows:
+        """Store what became of a block and return its rows."""
+        ...
+
+
+class Scheduler:
+    """Runs a survey to its end.
+
+    At most `in_flight` blocks are submitted at a time. A block whose worker dies is submitted again, `ATTEMPTS` times
+    in all; any other failure is final for this run.
+
+    Args:
+        survey: what is asked and told.
+        executor: where blocks run; it is shut down at the end.
+        work: the evaluation.
+        store: keeps the rows of finished blocks, and answers for those it has.
+        in_flight: how many blocks are submitted at a time.
+        advance: called with the number of rows of each block that is stored.
+
+    Raises:
+        RunError: workers die one after the other, or the store cannot be written.
+        KeyboardInterrupt: Ctrl-C; blocks that were done by then are stored, all others are abandoned at once.
+    """
+
+    def __init__(
+        self,
+        survey: Survey,
+        executor: Executor,
+        work: Work,
+        store: BlockStore,
+        in_flight: int,
+        advance: Callable[[int], None],
+    ) -> None:
+        self._survey, self._executor, self._work, self._store = survey, executor, work, store
+        self._in_flight, self._advance = in_flight, advance
+        self._queue: deque[Block] = deque()
+        self._pending: dict[Future[Outcome], Block] = {}
+        self._attempts: Counter[int] = Counter()
+        self._lost_in_a_row = 0
+
+    def run(self) -> None:
+        """Ask, evaluate, store, tell, until the survey is finished."""
+        try:
+            while not self._survey.finished:
+                self._submit()
+                self._collect()
+        except KeyboardInterrupt:
+            self._abandon()
+            self._keep_what_is_done()
+            raise
+        except BaseException:
+            self._abandon()
+            raise
+        self._executor.shutdown()
+
+    def _submit(self) -> None:
+        while len(self._pending) < self._in_flight:
+            block = self._next()
+            if block is None:
+                return
+            self._pending[self._executor.submit(evaluate, self._work, block.design)] = block
+
+    def _next(self) -> Block | None:
+        """The next block that is not stored; those that are, are told on the way."""
+        while True:
+            if not self._queue:
+                self._queue.extend(self._survey.ask())
+            if not self._queue:
+                return None
+            block = self._queue.popleft()
+            rows = self._store.load(block)
+            if rows is None:
+                return block
+            self._tell(block, rows)
+
+    def _collect(self) -> None:
+        if not self._pending:
+            if self._survey.finished:
+                return
+            raise RunError("the survey is not finished, but has no further points to evaluate")
+        done, _ = wait(self._pending, return_when=FIRST_COMPLETED)
+        for future in sorted(done, key=lambda one: self._pending[one].number):
+            self._take(self._pending.pop(future), future)
+
+    def _take(self, block: Block, future: Future[Outcome]) -> None:
+        try:
+            outcome = future.result()
+            self._lost_in_a_row = 0
+        except WorkerLost as problem:
+            self._attempts[block.number] += 1
+            self._lost_in_a_row += 1
+            if self._lost_in_a_row > ATTEMPTS * self._in_flight:
+                raise RunError(f"worker processes keep ending: {problem}; scheduler=serial does without") from None
+            if self._attempts[block.number] < ATTEMPTS:
+                _log.warning("block %d is tried again: %s", block.number, problem)
+                self._queue.appendleft(block)
+                return
+            outcome = Outcome(None, str(problem))
+        except Exception as problem:  # noqa: BLE001 - becomes rows with their reason
+            outcome = Outcome(None, describe(problem))
+        self._tell(block, self._store.save(block, outcome))
+
+    def _tell(self, block: Block, rows: Rows) -> None:
+        self._survey.tell(block.number, rows)
+        self._advance(len(next(iter(rows.values()))))
+
+    def _abandon(self) -> None:
+        self._executor.shutdown(cancel_futures=True)
+
+    def _keep_what_is_done(self) -> None:
+        for future, block in self._pending.items():
+            if future.done() and not future.cancelled() and future.exception() is None:
+                self._store.save(block, future.result())

@@ -1,0 +1,124 @@
+"""The summary of a run, as ``--json`` prints it and ``run.json`` holds it."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from fracctl.execution.row_store import RowStore
+from fracctl.execution.worker import Evaluator
+from fracctl.store.columns import REASON
+from fracctl.surveys.base import Rows
+
+Optimum = Mapping[str, Any]
+
+_ADDED_COLUMNS = ("kind", "slice", "objective_name", REASON)
+_NO_OPTIMUM_NEEDS = "needs status ok, a finite value and a loop that is not unstable"
+
+
+class Tally:
+    """Counts the rows of each initial condition by status."""
+
+    def __init__(self) -> None:
+        self._counts: dict[str, Counter[str]] = {}
+
+    def add(self, rows: Rows) -> None:
+        """Count further rows."""
+        names, words = rows["initial_condition"].tolist(), rows["status"].tolist()
+        for (name, word), count in Counter(zip(names, words, strict=True)).items():
+            self._counts.setdefault(name, Counter())[word] += count
+
+    def total(self, word: str) -> int:
+        """Return the number of rows with this status."""
+        return sum(counts[word] for counts in self._counts.values())
+
+    @property
+    def rows(self) -> int:
+        """Number of all rows."""
+        return sum(counts.total() for counts in self._counts.values())
+
+    def sentence(self, initial_condition: str) -> str:
+        """Return e.g. ``of 3 points 2 unsettled, 1 unstable``."""
+        counts = self._counts.get(initial_condition, Counter())
+        return f"of {counts.total()} points " + ", ".join(f"{count} {word}" for word, count in counts.most_common())
+
+
+def results(evaluation: Evaluator, optima: Iterable[Optimum]) -> list[dict[str, Any]]:
+    """Return optimum, baseline and change for every objective, the primary one first, and initial condition."""
+    rows = list(optima)
+    names = sorted(evaluation.objectives, key=lambda name: name != evaluation.objective)
+    return [_result(rows, ic, name) for name in names for ic in evaluation.initial_conditions]
+
+
+def _result(optima: Sequence[Optimum], initial_condition: str, objective: str) -> dict[str, Any]:
+    def of(kind: str) -> dict[str, Any] | None:
+        key = (kind, objective, initial_condition)
+        found = [row for row in optima if (row["kind"], row["objective_name"], row["initial_condition"]) == key]
+        return _values(found[0]) if found else None
+
+    optimum, baseline = of("overall"), of("baseline")
+    return {
+        "initial_condition": initial_condition,
+        "objective_name": objective,
+        "optimum": optimum,
+        "baseline": baseline,
+        "change_percent": _change(optimum, baseline, f"objective_{objective}"),
+    }
+
+
+def _values(row: Optimum) -> dict[str, Any]:
+    return {name: finite_or_none(value) for name, value in row.items() if name not in _ADDED_COLUMNS}
+
+
+def finite_or_none(value: Any) -> Any:
+    """Return a value as JSON can hold it: null for infinities and NaN."""
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _change(optimum: Optimum | None, baseline: Optimum | None, column: str) -> float | None:
+    if optimum is None or baseline is None or not baseline[column]:
+        return None
+    return 100.0 * (float(optimum[column]) / float(baseline[column]) - 1.0)
+
+
+def notes_on(found: Sequence[Mapping[str, Any]], baseline: Mapping[str, float], tally: Tally) -> list[str]:
+    """Return a sentence for every result that is missing."""
+    notes = []
+    for result in found:
+        where = f"{result['objective_name']} for {result['initial_condition']}"
+        if result["optimum"] is None:
+            counts = tally.sentence(result["initial_condition"])
+            notes.append(f"no optimum of {where}: {counts}; an optimum {_NO_OPTIMUM_NEEDS}")
+        elif baseline and result["baseline"] is None:
+            values = ", ".join(f"{name} = {value:g}" for name, value in baseline.items())
+            notes.append(f"no baseline of {where}: no point with {values} can be an optimum")
+    if failed := tally.total("failed"):
+        notes.append(f"{failed} of {tally.rows} rows failed and are in no result")
+    return notes
+
+
+def summarise(
+    identity: Mapping[str, str], store: RowStore, found: Sequence[dict[str, Any]], notes: Sequence[str]
+) -> dict[str, Any]:
+    """Return the summary; `identity` holds experiment, run_id and run_directory."""
+    first = found[0]
+    return {
+        **identity,
+        "status": "incomplete" if store.failures else "finished",
+        "reused": False,
+        "optimum": first["optimum"],
+        "baseline": first["baseline"],
+        "change_percent": first["change_percent"],
+        "error": _error(store),
+        "optima": list(found),
+        "notes": list(notes),
+    }
+
+
+def _error(store: RowStore) -> str | None:
+    if not store.failures:
+        return None
+    reason = next(iter(store.failures.values()))
+    return f"{store.failed_points} points could not be computed ({reason}); the same command tries them again"

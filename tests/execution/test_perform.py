@@ -1,0 +1,278 @@
+"""A run from beginning to end, in this process."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pyarrow.parquet as pq
+import pytest
+
+from fracctl.errors import RunError
+from fracctl.execution.perform import perform
+from fracctl.store import RunDirectory
+from fracctl.store.lock import exclusive
+from tests.execution.fakes import N_BLOCKS, N_POINTS, job
+from tests.store.disks import full_after, small_disk
+
+
+class Watch:
+    """A progress that remembers, and interrupts after some rows."""
+
+    def __init__(self, interrupt_after: int | None = None) -> None:
+        self.total: int | None = None
+        self.rows = 0
+        self.finished = False
+        self._interrupt_after = interrupt_after
+
+    def start(self, total_rows: int | None) -> None:
+        self.total = total_rows
+
+    def advance(self, rows: int) -> None:
+        self.rows += rows
+        if self._interrupt_after is not None and self.rows >= self._interrupt_after:
+            raise KeyboardInterrupt
+
+    def finish(self) -> None:
+        self.finished = True
+
+
+def tables_of(path: Path) -> dict[str, dict[str, Any]]:
+    """Everything in the tables, numbers as their bytes."""
+    found = {}
+    for name in ("evaluations", "optima", "trajectories"):
+        table = pq.read_table(path / f"{name}.parquet")
+        columns = {c: table.column(c) for c in table.column_names}
+        found[name] = {
+            c: column.to_numpy().tobytes() if column.type in ("double", "int64") else column.to_pylist()
+            for c, column in columns.items()
+        }
+    return found
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return perform(job(tmp_path_factory.mktemp("undisturbed"))).run_directory
+
+
+def files_of(path: Path) -> set[str]:
+    return {str(found.relative_to(path)) for found in path.rglob("*")}
+
+
+def test_the_directory_holds_what_the_design_says(undisturbed: Path) -> None:
+    tables = {f"{name}.parquet" for name in ("evaluations", "optima", "trajectories")}
+    assert files_of(undisturbed) == tables | {"run.json", "run.log", "manifest.sha256"}
+    assert RunDirectory(undisturbed).verify() == []
+    assert undisturbed.parent.name == "fake"
+    assert files_of(undisturbed.parent) == {undisturbed.name} | {
+        f"{undisturbed.name}/{n}" for n in files_of(undisturbed)
+    }
+
+
+def test_evaluations_hold_every_point_once_in_order(undisturbed: Path) -> None:
+    frame = RunDirectory(undisturbed).evaluations()
+    assert len(frame) == 2 * N_POINTS
+    assert not frame.duplicated(["point", "initial_condition"]).any()
+    points = frame.drop_duplicates("point")
+    assert points["point"].tolist() == list(range(N_POINTS))
+    assert points["alpha_w"].is_monotonic_increasing
+    assert list(frame)[:3] == ["point", "initial_condition", "alpha_w"]
+    assert frame["reason"].isna().all()
+
+
+def test_optima_and_trajectories_belong_together(undisturbed: Path) -> None:
+    run = RunDirectory(undisturbed)
+    optima, trajectories = run.optima(), run.trajectories()
+    counts = optima.groupby(["kind", "objective_name", "initial_condition"]).size()
+    assert counts.loc["slice"].eq(5).all()
+    assert counts.loc["overall"].eq(1).all()
+    best = optima.query("kind == 'overall' and objective_name == 'time' and initial_condition == 'one'").iloc[0]
+    assert (best["alpha_w"], best["k_p_w"], best["k_d_w"]) == (0.8, 0.8, 1.6)
+    shown = optima[optima["kind"].isin(["overall", "baseline"])]
+    assert sorted(trajectories["run"].unique()) == shown.index.tolist()
+    last = trajectories[trajectories["run"] == best.name].iloc[-1]
+    assert last["time"] == 10.0
+    assert last["w"] == pytest.approx(np.exp(-10.0 / best["settling_time"]))
+
+
+def test_the_summary_is_plain_and_stored(undisturbed: Path) -> None:
+    summary = RunDirectory(undisturbed).run_json["summary"]
+    assert summary["status"] == "finished"
+    assert summary["experiment"] == "fake"
+    assert summary["run_directory"] == str(undisturbed)
+    assert summary["optimum"]["settling_time"] == pytest.approx(0.8)
+    assert summary["baseline"]["alpha_w"] == 1.0
+    assert summary["change_percent"] == pytest.approx(-20.0)
+    assert summary["error"] is None
+    assert [(r["objective_name"], r["initial_condition"]) for r in summary["optima"]] == [
+        ("time", "one"),
+        ("time", "two"),
+        ("joint", "one"),
+        ("joint", "two"),
+    ]
+    json.dumps(summary, allow_nan=False)
+
+
+def test_run_json_and_footers_say_where_the_numbers_come_from(undisturbed: Path) -> None:
+    content = RunDirectory(undisturbed).run_json
+    provenance = content["provenance"]
+    assert provenance["versions"]["numpy"] == np.__version__
+    assert provenance["seed"] == 0
+    assert provenance["workers"] == 1
+    assert provenance["wall_time_s"] > 0.0
+    for name in ("evaluations", "optima", "trajectories"):
+        metadata = pq.read_schema(undisturbed / f"{name}.parquet").metadata
+        assert json.loads(metadata[b"fracctl.configuration"]) == content["configuration"]
+        assert json.loads(metadata[b"fracctl.provenance"])["platform"] == provenance["platform"]
+
+
+def test_an_identical_run_computes_nothing(tmp_path: Path) -> None:
+    watch = Watch()
+    first = perform(job(tmp_path))
+    again = perform(job(tmp_path, faults=[{"kind": "raises", "alpha_w": 0.8}]), progress=watch)
+    assert not first.reused
+    assert again.reused
+    assert watch.total is None
+    assert again.summary == first.summary | {"reused": True}
+    pd.testing.assert_frame_equal(again.evaluations, first.evaluations)
+    pd.testing.assert_frame_equal(again.optima, first.optima)
+
+
+def test_another_run_gets_another_directory(tmp_path: Path) -> None:
+    assert perform(job(tmp_path)).run_directory != perform(job(tmp_path, seed=1)).run_directory
+
+
+def test_fresh_computes_again_in_the_same_place(tmp_path: Path, undisturbed: Path) -> None:
+    first = perform(job(tmp_path))
+    marker = first.run_directory / "report.html"
+    marker.touch()
+    again = perform(job(tmp_path), fresh=True)
+    assert not again.reused
+    assert again.run_directory == first.run_directory
+    assert not marker.exists()
+    assert list(again.run_directory.parent.iterdir()) == [again.run_directory]
+    assert tables_of(again.run_directory) == tables_of(undisturbed)
+
+
+def test_a_damaged_run_is_computed_again_with_a_note(tmp_path: Path, undisturbed: Path) -> None:
+    first = perform(job(tmp_path))
+    path = first.run_directory / "evaluations.parquet"
+    content = bytearray(path.read_bytes())
+    content[1000] ^= 1
+    path.write_bytes(bytes(content))
+    again = perform(job(tmp_path))
+    assert not again.reused
+    assert again.summary["notes"] == [
+        "the stored run was damaged (evaluations.parquet has changed) and has been computed again"
+    ]
+    assert tables_of(again.run_directory) == tables_of(undisturbed)
+    assert RunDirectory(again.run_directory).verify() == []
+
+
+@pytest.mark.parametrize("after", [1, N_POINTS, 2 * N_POINTS])
+def test_an_interrupted_run_continues(tmp_path: Path, undisturbed: Path, after: int) -> None:
+    watch = Watch(interrupt_after=after)
+    with pytest.raises(KeyboardInterrupt):
+        perform(job(tmp_path), progress=watch)
+    assert watch.finished
+    (directory,) = (tmp_path / "fake").iterdir()
+    assert RunDirectory(directory).status == "interrupted"
+    kept = len(list((directory / "parts").glob("*.parquet")))
+    assert 0 < kept <= N_BLOCKS
+    finished = perform(job(tmp_path))
+    assert f"{N_BLOCKS} blocks: {kept} were stored" in (directory / "run.log").read_text()
+    assert tables_of(finished.run_directory) == tables_of(undisturbed)
+
+
+def test_a_damaged_part_is_computed_again(tmp_path: Path, undisturbed: Path) -> None:
+    with pytest.raises(KeyboardInterrupt):
+        perform(job(tmp_path), progress=Watch(interrupt_after=N_POINTS))
+    part = next((tmp_path / "fake").glob("*/parts/000000.parquet"))
+    content = bytearray(part.read_bytes())
+    content[len(content) // 2] ^= 1
+    part.write_bytes(bytes(content))
+    finished = perform(job(tmp_path))
+    assert tables_of(finished.run_directory) == tables_of(undisturbed)
+    assert "stored parts that could not be trusted and were computed again: 1" in finished.summary["notes"]
+
+
+def test_progress_counts_every_row(tmp_path: Path) -> None:
+    watch = Watch()
+    perform(job(tmp_path), progress=watch)
+    assert (watch.total, watch.rows, watch.finished) == (2 * N_POINTS, 2 * N_POINTS, True)
+
+
+@pytest.mark.parametrize("kind", ["raises", "exits", "returns nonsense"])
+def test_a_failed_block_is_rows_with_a_reason_and_tried_again(tmp_path: Path, undisturbed: Path, kind: str) -> None:
+    first = perform(job(tmp_path, faults=[{"kind": kind, "alpha_w": 0.8}]))
+    failed = first.evaluations[first.evaluations["status"] == "failed"]
+    reasons = {
+        "raises": "ValueError: the fault was asked for",
+        "exits": "SystemExit: 3",
+        "returns nonsense": "ValueError: the evaluation must return 882 values of nodes",
+    }
+    assert len(failed) == 2 * 441
+    assert failed["reason"].unique().tolist() == [reasons[kind]]
+    assert failed["k_p_w"].notna().all()
+    assert failed["stable"].isna().all()
+    assert first.optima["alpha_w"].min() == 0.85
+    assert first.summary["status"] == "incomplete"
+    assert (
+        first.summary["error"]
+        == f"441 points could not be computed ({reasons[kind]}); the same command tries them again"
+    )
+    assert "882 of 4410 rows failed and are in no result" in first.summary["notes"]
+    again = perform(job(tmp_path))
+    assert again.summary["status"] == "finished"
+    assert tables_of(again.run_directory) == tables_of(undisturbed)
+    assert not (again.run_directory / "parts").exists()
+
+
+def test_a_run_without_one_good_point_is_an_error(tmp_path: Path) -> None:
+    faults = [{"kind": "raises", "alpha_w": alpha} for alpha in (0.8, 0.85, 0.9, 0.95, 1.0)]
+    with pytest.raises(RunError, match=r"every point failed: ValueError: the fault was asked for$"):
+        perform(job(tmp_path, faults=faults))
+    (directory,) = (tmp_path / "fake").iterdir()
+    assert RunDirectory(directory).run_json["error"] == "every point failed: ValueError: the fault was asked for"
+    assert perform(job(tmp_path)).summary["status"] == "finished"
+
+
+def test_a_full_disk_loses_nothing(tmp_path: Path, undisturbed: Path) -> None:
+    for n_bytes in (100, 3_000, 60_000, 120_000, 160_000, 250_000):
+        with full_after(n_bytes), pytest.raises(RunError, match=r"cannot write .*: No space left on device; what was"):
+            perform(job(tmp_path))
+    finished = perform(job(tmp_path))
+    (line,) = [text for text in (finished.run_directory / "run.log").read_text().splitlines() if "blocks:" in text][-1:]
+    assert f"{N_BLOCKS} were stored" in line
+    assert tables_of(finished.run_directory) == tables_of(undisturbed)
+
+
+@pytest.mark.parametrize("size", ["16k", "128k", "300k"])
+def test_a_really_full_disk(tmp_path: Path, size: str) -> None:
+    with (
+        small_disk(tmp_path / "disk", size) as disk,
+        pytest.raises(RunError, match="No space left on device; what was computed is kept"),
+    ):
+        perform(job(disk))
+
+
+def test_a_place_that_cannot_be_written_is_one_sentence(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    with pytest.raises(RunError, match=r"cannot write .*file.*Not a directory; output_dir=DIR writes elsewhere"):
+        perform(job(tmp_path / "file"))
+
+
+def test_two_processes_do_not_write_the_same_run(tmp_path: Path) -> None:
+    with pytest.raises(KeyboardInterrupt):
+        perform(job(tmp_path), progress=Watch(interrupt_after=1))
+    (directory,) = (tmp_path / "fake").iterdir()
+    with exclusive(RunDirectory(directory).lock), pytest.raises(RunError, match="another process"):
+        perform(job(tmp_path))
+
+
+def test_the_stored_configuration_is_the_given_one(tmp_path: Path) -> None:
+    one = job(tmp_path)
+    assert RunDirectory(perform(one).run_directory).run_json["configuration"] == one.configuration
