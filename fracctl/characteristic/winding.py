@@ -98,12 +98,15 @@ def _between(left: Complexes, right: Complexes) -> Complexes:
 def crossings(values: Complexes) -> tuple[Floats, Booleans]:
     """Count crossings of the negative real axis, counter-clockwise ones as +1, along (b, k).
 
-    A step that moves by two quadrants is ambiguous: it is marked in (b, k - 1) and not counted.
+    A step that turns by more than a right angle is ambiguous: it is marked in (b, k - 1) and not counted.
     """
-    below, left = values.imag < 0.0, values.real < 0.0
-    turned, swung = below[:, 1:] != below[:, :-1], left[:, 1:] != left[:, :-1]
-    ambiguous = turned & swung
-    crossed = turned & left[:, 1:] & ~ambiguous
+    re, im = values.real, values.imag
+    re0, im0, re1, im1 = re[:, :-1], im[:, :-1], re[:, 1:], im[:, 1:]
+    ambiguous = re0 * re1 + im0 * im1 <= 0.0
+    below = im < 0.0
+    turned = below[:, 1:] != below[:, :-1]
+    through_left = (re0 * im1 - re1 * im0) * (im1 - im0) < 0.0
+    crossed = turned & through_left & ~ambiguous
     downward = below[:, 1:]
     turns: Floats = (crossed & downward).sum(axis=1) - (crossed & ~downward).sum(axis=1).astype(np.float64)
     return turns, ambiguous

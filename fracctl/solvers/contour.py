@@ -33,7 +33,7 @@ from fracctl.solvers.contour_plan import make_plan
 from fracctl.solvers.contour_response import Response, respond
 from fracctl.trajectory import Trajectory
 
-_FIRST_HULL = 0.6
+_FIRST_HULL = 1.0
 """First guess of the largest imaginary part of poles, relative to the pole radius."""
 _CHUNK = 1024
 _LARGEST_GROWTH = 200.0
@@ -141,9 +141,9 @@ class Contour:
     ) -> Iterator[Survey]:
         """Solve `rows`, those that miss the tolerance again with a wider hull, the third time as they come out."""
         cost = np.zeros(len(members), dtype=np.int64)
-        for attempt, (width, safety) in enumerate([(_FIRST_HULL, 0.03), (1.0, 0.01), (1.5, 0.001)]):
+        for attempt, (width, safety) in enumerate([(_FIRST_HULL, 0.03), (1.1, 0.003), (1.5, 0.001)]):
             missed: list[Array] = []
-            for group in _hull_classes(rows, radius, shift, width, 2.0 if attempt else 1.5):
+            for group in _hull_classes(rows, radius, shift, width, 1.5 if attempt else 1.25):
                 plan = make_plan(horizon, group.hull, group.radius, group.shift, max(safety * self.tolerance, 3e-13))
                 cost[group.rows] += plan.nodes
                 pick = members[group.rows] if y0.shape[1] > 1 else slice(None)

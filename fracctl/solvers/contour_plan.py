@@ -12,11 +12,11 @@ from fracctl.panels import Panel, PanelGrid
 from fracctl.solvers.contour_design import ContourShape, design
 
 LARGEST_RATIO = 8.0
-SERIES_REACH = 0.03
+SERIES_REACH = 0.012
 """Time, times the pole radius, up to which the solution is taken from its power series."""
-SERIES_START = 1e-10
+SERIES_START = 1e-7
 """First time of the first panel, relative to its end."""
-SERIES_NODES = 26
+SERIES_NODES = 24
 _LONGEST = 36.0
 """Half-length of a panel times the largest frequency, beyond which a window is split."""
 

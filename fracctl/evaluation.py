@@ -1,0 +1,149 @@
+"""From design points to rows: one evaluation solves, measures and combines a batch."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+
+from fracctl.arrays import Array, Floats
+from fracctl.controllers.linear import LinearLaw
+from fracctl.controllers.parameters import Parameter
+from fracctl.errors import ArgumentError, UnsupportedError
+from fracctl.loop import ClosedLoop
+from fracctl.measures.base import Measure
+from fracctl.plants.linear import LinearPlant
+from fracctl.solvers.base import Solver
+from fracctl.trajectory import Trajectory
+
+COUNTERS = ("nodes",)
+
+
+class ParametrisedLaw(Protocol):
+    """A class of laws whose gains and orders have names."""
+
+    @staticmethod
+    def parameters(components: Sequence[str]) -> tuple[Parameter, ...]:
+        """Return the parameters for a plant with these components."""
+        ...
+
+    @classmethod
+    def from_parameters(cls, components: Sequence[str], values: Mapping[str, Floats | float]) -> LinearLaw:
+        """Build the law from numbers or arrays (b,) by parameter name."""
+        ...
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """How a design point becomes a row for each initial condition.
+
+    Raises:
+        ArgumentError: an objective names a column that no measure has, or the primary objective is unknown.
+    """
+
+    plant: LinearPlant
+    law: type[ParametrisedLaw]
+    parameters: Mapping[str, float]
+    """The law's values where the design leaves them alone."""
+    initial_conditions: Mapping[str, Floats]
+    """State (n,) by name."""
+    solver: Solver
+    measures: tuple[Measure, ...]
+    objectives: Mapping[str, tuple[str, ...]]
+    """Columns of measures whose geometric mean each objective is."""
+    objective: str
+    """Name of the primary objective."""
+    horizon: float
+
+    def __post_init__(self) -> None:
+        known = [column for measure in self.measures for column in measure.columns]
+        for name, columns in self.objectives.items():
+            for column in columns:
+                if column not in known:
+                    raise ArgumentError(f"objectives.{name}", repr(column), f"must name measured columns {known}")
+        if self.objective not in self.objectives:
+            raise ArgumentError("objective", repr(self.objective), f"must be one of {sorted(self.objectives)}")
+
+    @cached_property
+    def design_variables(self) -> tuple[str, ...]:
+        """All parameters of the law, in the order of the columns."""
+        return tuple(parameter.name for parameter in self.law.parameters(self.plant.components))
+
+    @cached_property
+    def row_columns(self) -> tuple[str, ...]:
+        """Columns of the rows, in order."""
+        measured = tuple(column for measure in self.measures for column in measure.columns)
+        objectives = ("objective", *(f"objective_{name}" for name in self.objectives))
+        tail = ("status", "stable", "error_estimate", *COUNTERS)
+        return ("initial_condition", *self.design_variables, *measured, *objectives, *tail)
+
+    def loop(self, design: Mapping[str, Floats | float]) -> ClosedLoop:
+        """Return the closed loop, of a batch where `design` holds arrays."""
+        return ClosedLoop(self.plant, self.law.from_parameters(self.plant.components, {**self.parameters, **design}))
+
+    def __call__(self, design: Mapping[str, Floats]) -> dict[str, Array]:
+        """Return the rows of b design points: all points of the first initial condition, then of the next.
+
+        `status` is ``ok``, ``unsettled`` (no settling within the horizon, or a marginal loop), ``unstable``, ``diverged`` or
+        ``failed`` (certificate not met). Measures of trajectories that do not exist are +inf.
+        """
+        full = self._full_design(design)
+        b, k = len(next(iter(full.values()))), len(self.initial_conditions)
+        loop = self.loop(full)
+        if refusal := self.solver.supports(loop):
+            raise UnsupportedError(refusal)
+        rows: dict[str, Array] = {"initial_condition": np.repeat(np.array(list(self.initial_conditions), object), b)}
+        rows |= {name: np.tile(values, k) for name, values in full.items()}
+        states = np.stack(list(self.initial_conditions.values()))
+        for part in self.solver.survey(loop, states, self.horizon):
+            where = (np.arange(k)[:, None] * b + part.rows).ravel()
+            for name, values in self._measured(part.trajectory).items():
+                if name not in rows:
+                    rows[name] = np.empty(k * b, dtype=values.dtype)
+                rows[name][where] = values
+        return {name: rows[name] for name in self.row_columns}
+
+    def solve(self, design: Mapping[str, float], initial_condition: str, horizon: float | None = None) -> Trajectory:
+        """Return the trajectory of one design point, over `horizon` or the evaluation's own."""
+        state = self.initial_conditions[initial_condition]
+        return self.solver.solve(self.loop(design), state, horizon or self.horizon)
+
+    def _full_design(self, design: Mapping[str, Floats]) -> dict[str, Floats]:
+        defaults = {p.name: p.default for p in self.law.parameters(self.plant.components)} | dict(self.parameters)
+        unknown = set(design) - set(defaults)
+        if unknown:
+            raise ArgumentError("design", sorted(unknown)[0], f"must name parameters of the law, {sorted(defaults)}")
+        arrays = {name: np.atleast_1d(np.asarray(design.get(name, value), float)) for name, value in defaults.items()}
+        return dict(zip(arrays, map(np.ascontiguousarray, np.broadcast_arrays(*arrays.values())), strict=True))
+
+    def _measured(self, trajectory: Trajectory) -> dict[str, Array]:
+        """Return measures, objectives, status and counters of one group of trajectories."""
+        solved = np.isin(trajectory.status, ("ok", "failed"))
+        values: dict[str, Array] = {}
+        for measure in self.measures:
+            if solved.any():
+                values |= measure(trajectory)
+            else:
+                values |= {column: np.full(len(solved), np.inf) for column in measure.columns}
+        rows = dict(values)
+        means = {name: geometric_mean([values[c] for c in columns]) for name, columns in self.objectives.items()}
+        rows["objective"] = means[self.objective]
+        rows |= {f"objective_{name}": mean for name, mean in means.items()}
+        status = trajectory.status.copy()
+        unsettled = np.logical_or.reduce([~np.isfinite(column) for column in values.values()])
+        marginal = np.equal(trajectory.stable, None)
+        status[(status == "ok") & (unsettled | marginal)] = "unsettled"
+        rows |= {"status": status, "stable": trajectory.stable, "error_estimate": trajectory.error_estimate}
+        return rows | {name: trajectory.counters[name] for name in COUNTERS}
+
+
+def geometric_mean(columns: Sequence[Floats]) -> Floats:
+    """Return (Π columns)^(1/count), (b,); a single column is returned as it is, infinities stay."""
+    if len(columns) == 1:
+        return columns[0]
+    with np.errstate(invalid="ignore"):
+        mean: Floats = np.prod(columns, axis=0) ** (1.0 / len(columns))
+    return np.where(np.isinf(np.asarray(columns)).any(axis=0), np.inf, mean)

@@ -1,0 +1,8 @@
+"""Measures of performance, each a function of a batch of trajectories."""
+
+from fracctl.measures.base import Measure
+from fracctl.measures.control_effort import ControlEffort, control_effort
+from fracctl.measures.overshoot import Overshoot, overshoot
+from fracctl.measures.settling_time import SettlingTime, settling_time
+
+__all__ = ["ControlEffort", "Measure", "Overshoot", "SettlingTime", "control_effort", "overshoot", "settling_time"]

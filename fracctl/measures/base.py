@@ -1,0 +1,20 @@
+"""What every measure offers."""
+
+from __future__ import annotations
+
+from typing import Protocol, runtime_checkable
+
+from fracctl.arrays import Floats
+from fracctl.trajectory import Trajectory
+
+
+@runtime_checkable
+class Measure(Protocol):
+    """A named function of trajectories."""
+
+    name: str
+    columns: tuple[str, ...]
+
+    def __call__(self, trajectory: Trajectory) -> dict[str, Floats]:
+        """Return each column as (b,)."""
+        ...

@@ -1,0 +1,46 @@
+"""Stability of a linear fractional loop by the argument principle, with its principal-sheet poles."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from fracctl.arrays import Complexes
+from fracctl.characteristic.matrix import CharacteristicMatrix
+from fracctl.characteristic.poles import principal_poles
+from fracctl.characteristic.winding import unstable_zeros
+from fracctl.errors import ArgumentError
+from fracctl.loop import ClosedLoop
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Whether a loop is asymptotically stable, and why."""
+
+    stable: bool | None
+    """True, False, or None where a pole lies on the imaginary axis to rounding."""
+    poles: Complexes
+    """Principal-sheet poles, by descending real part, dimensionless."""
+    certificate: str
+    """The count that proves the verdict."""
+    method: str = "argument principle on the imaginary axis"
+
+
+def assess(loop: ClosedLoop) -> Verdict:
+    """Return the verdict for a single loop.
+
+    A loop of commensurate or any real orders is stable exactly if det M(σ) has no zero with Re σ ≥ 0 (Matignon
+    1996; Yaylali, Butcher, Sinclair, Eq. 22 in the pseudo-state form).
+
+    Raises:
+        ArgumentError: the loop is a batch.
+    """
+    if loop.batch is not None:
+        raise ArgumentError("loop", f"a batch of {loop.batch}", "must be a single loop; solve a batch for its verdicts")
+    matrix = CharacteristicMatrix(loop.system)
+    zeros, marginal = unstable_zeros(matrix)
+    poles, complete = principal_poles(matrix)
+    found = f"{len(poles)} principal-sheet poles found{'' if complete else ', not all'}"
+    if marginal[0]:
+        return Verdict(None, poles, f"det M vanishes on the imaginary axis; {found}")
+    count = int(zeros[0])
+    return Verdict(count == 0, poles, f"{count} zeros of det M with Re σ > 0; {found}")
