@@ -8,6 +8,7 @@ from concurrent.futures import Executor, Future
 from typing import Any, ParamSpec, TypeVar
 
 from fracctl.execution.processes import ProcessExecutor
+from fracctl.execution.threads import SINGLE_THREAD
 
 _P = ParamSpec("_P")
 _T = TypeVar("_T")
@@ -42,4 +43,4 @@ def make_executor(scheduler: Mapping[str, Any], n_points: int | None) -> Executo
     """Return the executor of the configuration's `scheduler`."""
     if scheduler["type"] == "serial" or n_points == 1:
         return InProcessExecutor()
-    return ProcessExecutor(n_workers(scheduler, n_points))
+    return ProcessExecutor(n_workers(scheduler, n_points), SINGLE_THREAD)

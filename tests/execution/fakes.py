@@ -12,9 +12,11 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+import pytest
 
 from fracctl.execution.computation import Job
 from fracctl.execution.worker import Work
+from fracctl.store import identity
 from fracctl.surveys import Grid, Survey, axis_values
 
 FACTORY = "tests.execution.fakes:evaluation"
@@ -117,6 +119,11 @@ def commit(fault: Mapping[str, Any]) -> None:
         sys.exit(3)
     if fault["kind"] == "exits at once":
         os._exit(3)
+
+
+def fix_identity(patch: pytest.MonkeyPatch) -> None:
+    """Take the sources of the package for unchanged."""
+    patch.setattr(identity, "sources_digest", lambda: "fixed")
 
 
 def evaluation(data: Mapping[str, Any]) -> FakeEvaluation:
