@@ -96,7 +96,7 @@ def to_yaml(config: RunConfig) -> str:
 @contextmanager
 def _hydra(found: Catalogue) -> Iterator[ConfigLoader]:
     """Hydra over the catalogue's directories; whatever Hydra application we are called from finds its own again."""
-    ours = (GlobalHydra, JobRuntime, version.VersionBase)
+    ours: tuple[type, ...] = (GlobalHydra, JobRuntime, version.VersionBase)
     saved = {kind: Singleton._instances.pop(kind) for kind in ours if kind in Singleton._instances}
     try:
         version.setbase("1.3")
@@ -120,7 +120,7 @@ def _load(words: list[str], loader: ConfigLoader, found: Catalogue) -> tuple[dic
         defaults = loader.compute_defaults_list(_PRIMARY, words, RunMode.RUN).defaults
         config = hydra_compose(_PRIMARY, words)
     except Exception as error:
-        raise ConfigurationError(_reason(error, found)) from error
+        raise ConfigurationError(_reason(error)) from error
     files = [
         (entry.config_path, entry.package or "")
         for entry in defaults
@@ -164,9 +164,8 @@ def _parse(text: str, loader: ConfigLoader, found: Catalogue) -> Override:
     except UsageError:
         raise
     except Exception as error:
-        raise UsageError(
-            f"cannot read '{text}' ({_first_line(error)}); put values with special characters in quotes: KEY=\"'VALUE'\""
-        ) from error
+        cure = "put values with special characters in quotes, KEY=\"'VALUE'\""
+        raise UsageError(f"cannot read '{text}' ({_first_line(error)}); {cure}") from error
     return Override(text, parsed.key_or_group, value, sweep, parsed.is_delete(), parsed.package)
 
 
@@ -182,7 +181,7 @@ def _sweep(parsed: HydraOverride) -> tuple[str, ...] | None:
     return tuple(Transformer.str(value) for value in values)
 
 
-def _reason(error: Exception, found: Catalogue) -> str:
+def _reason(error: Exception) -> str:
     """What Hydra means, in one line."""
     if isinstance(error, yaml.MarkedYAMLError) and error.problem_mark is not None:
         mark = error.problem_mark
@@ -195,7 +194,8 @@ def _reason(error: Exception, found: Catalogue) -> str:
         return f"there is no key '{lines[0].split(chr(39))[1]}' to remove"
     if lines and lines[0].startswith("Error merging override"):
         word = lines[0].partition("++")[2]
-        return f"cannot set '{word}': a mapping stays a mapping; set its keys one by one, {word.partition('=')[0]}.KEY=VALUE"
+        cure = f"set its keys one by one, {word.partition('=')[0]}.KEY=VALUE"
+        return f"cannot set '{word}': a mapping stays a mapping; {cure}"
     detail = f" ({_first_line(cause.__cause__)})" if isinstance(cause.__cause__, Exception) else ""
     return (lines[0] if lines else type(error).__name__) + detail
 

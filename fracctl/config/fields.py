@@ -26,7 +26,7 @@ _FILE_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*")
 
 def refusal(path: Path, value: Any, allowed: str, kind: str = "refused", **context: Any) -> InitErrorDetails:
     """One line of a ValidationError: what lies at `path`, and what is allowed there."""
-    custom = PydanticCustomError(kind, allowed, context or None)  # type: ignore[arg-type]
+    custom = PydanticCustomError(kind, allowed, context or None)
     return InitErrorDetails(type=custom, loc=path, input=value)
 
 
@@ -78,6 +78,13 @@ class Strict(BaseModel):
             return handler(data)
         except ValidationError as error:
             raise refuse(*lines_of(error, known=cls.model_fields)) from error
+
+
+class Typed(Strict):
+    """Options of what a name stands for."""
+
+    type: str
+    """The name, known to the registry."""
 
 
 def _file_name(value: Any) -> Any:

@@ -15,7 +15,7 @@ from pydantic import AfterValidator, Field, create_model
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from fracctl.config import registry
-from fracctl.config.fields import Number, Path, Strict, Whole, refusal, refuse
+from fracctl.config.fields import Number, Path, Strict, Typed, Whole, refusal, refuse
 from fracctl.errors import ArgumentError, ConfigurationError, FracctlError
 
 Factory: TypeAlias = Callable[..., Any]
@@ -46,18 +46,32 @@ def named_factory(kind: str, name: str, path: Path = ()) -> Factory:
 
 
 @cache
-def options_of(factory: Factory, named: bool = True, omitted: tuple[str, ...] = ()) -> type[Strict]:
-    """Return the schema of a factory's arguments; with the further key `type` where `named`.
+def options_of(factory: Factory) -> type[Strict]:
+    """Return the schema of a factory's arguments.
 
-    `omitted` arguments are no options. Annotations are those of pydantic; a dataclass is a mapping of its fields, ArrayLike is a number or nested lists.
+    Annotations are those of pydantic; a dataclass is a mapping of its fields, ArrayLike a number or nested lists.
     """
+    return create_model(_name(factory), __base__=Strict, **_fields(factory, ()))
+
+
+@cache
+def typed_options_of(factory: Factory, omitted: tuple[str, ...] = ()) -> type[Typed]:
+    """Return the schema of `type` and a factory's arguments without those omitted."""
+    return create_model(_name(factory), __base__=Typed, **_fields(factory, omitted))
+
+
+def _name(factory: Factory) -> str:
+    return f"{getattr(factory, '__name__', 'Factory')}Options"
+
+
+def _fields(factory: Factory, omitted: tuple[str, ...]) -> dict[str, Any]:
     hints = _hints(factory)
-    fields: dict[str, Any] = {"type": (str, ...)} if named else {}
+    fields: dict[str, Any] = {}
     for name, parameter in inspect.signature(factory).parameters.items():
         if parameter.kind not in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD) and name not in omitted:
             default = ... if parameter.default is parameter.empty else parameter.default
             fields[name] = (_schema(hints.get(name, Any)), default)
-    return create_model(f"{getattr(factory, '__name__', 'Factory')}Options", __base__=Strict, **fields)
+    return fields
 
 
 def construct(factory: Factory, options: Strict, **further: Any) -> Any:
@@ -112,7 +126,7 @@ def _schema(hint: Any) -> Any:
     if hint in (float, int, bool):
         return {float: Number, int: Whole, bool: Annotated[bool, Field(strict=True)]}[hint]
     if isinstance(hint, type) and dataclasses.is_dataclass(hint):
-        return options_of(hint, named=False)
+        return options_of(hint)
     if typing.get_origin(hint) in (typing.Union, types.UnionType):
         return typing.Union[tuple(_schema(part) for part in typing.get_args(hint))]  # noqa: UP007 - made at run time
     return hint

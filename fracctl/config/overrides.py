@@ -76,10 +76,9 @@ def options_of(override: Override) -> tuple[str, ...]:
                 f"'{override.text}': a run has one {_words(group)}; for a run with each, write -m {group}={each}"
             )
         return tuple(str(entry) for entry in value)
-    if isinstance(value, dict) or isinstance(value, bool) or value == "":
-        raise ConfigurationError(
-            f"'{override.text}': {group} takes the name of an option ('fracctl list {group}'); set keys as {group}.KEY=VALUE"
-        )
+    if isinstance(value, dict | bool) or value == "":
+        names = f"{group} takes the name of an option ('fracctl list {group}')"
+        raise ConfigurationError(f"'{override.text}': {names}; set keys as {group}.KEY=VALUE")
     return (str(value),)
 
 

@@ -11,8 +11,8 @@ from pydantic import AfterValidator, ValidationInfo, create_model
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from fracctl.config import registry
-from fracctl.config.fields import Number, Strict, each, refusal, refuse, unknown
-from fracctl.config.options import construct, factory_of, named_factory, options_of
+from fracctl.config.fields import Number, Strict, Typed, each, refusal, refuse, unknown
+from fracctl.config.options import construct, factory_of, named_factory, options_of, typed_options_of
 from fracctl.controllers import Parameter
 from fracctl.errors import ArgumentError
 from fracctl.plants import LinearPlant
@@ -24,28 +24,31 @@ LARGEST_GRID = 100_000_000
 _HCW_STATES = ("u", "v", "w", "u_dot", "v_dot", "w_dot")
 
 
-def registered(value: Any, info: ValidationInfo) -> Strict:
+def registered(value: Any, info: ValidationInfo) -> Typed:
     """A plant or a solver."""
     factory = factory_of(f"{info.field_name}s", plain(value))
-    options = options_of(factory).model_validate(plain(value))
+    options = typed_options_of(factory).model_validate(plain(value))
     construct(factory, options)
     return options
 
 
-def controller(value: Any, info: ValidationInfo) -> Strict:
+def controller(value: Any, info: ValidationInfo) -> Typed:
     """A law: its parameters for the components of the plant; unchecked while the plant is wrong."""
-    law = factory_of("controllers", plain(value))
+    value = plain(value)
+    law = factory_of("controllers", value)
     plant = plant_of(info.data)
-    return law_schema(law, plant.components).model_validate(plain(value)) if plant else Strict()
+    if plant is None:
+        return Typed(type=value["type"])
+    return law_schema(law, plant.components).model_validate(value)
 
 
 @cache
-def law_schema(law: Any, components: tuple[str, ...]) -> type[Strict]:
+def law_schema(law: Any, components: tuple[str, ...]) -> type[Typed]:
     """The schema of a law's parameters."""
-    fields: dict[str, Any] = {"type": (str, ...)}
+    fields: dict[str, Any] = {}
     for parameter in law.parameters(components):
         fields[parameter.name] = (Annotated[Number, AfterValidator(_within(parameter))], parameter.default)
-    return create_model(f"{law.__name__}Parameters", __base__=Strict, **fields)
+    return create_model(f"{law.__name__}Parameters", __base__=Typed, **fields)
 
 
 def initial_condition(value: Any, info: ValidationInfo) -> Strict:
@@ -56,10 +59,12 @@ def initial_condition(value: Any, info: ValidationInfo) -> Strict:
     options = states_schema(state_keys(plant)).model_validate(plain(value))
     given = options.model_dump()
     if given["units"] == "si" and plant.scales is None:
-        raise refuse(refusal(("units",), "si", "needs a plant with scales; set plant.scales or use dimensionless values"))
+        cure = "set plant.scales, or give dimensionless values"
+        raise refuse(refusal(("units",), "si", f"needs a plant with scales; {cure}"))
     if not any(given[name] for name in plant.state_names):
         states = ", ".join(plant.state_names)
-        raise refuse(refusal((), given, f"nothing moves, for all states of the plant are 0; set one of {states}", "sentence"))
+        still = f"nothing moves, for all states of the plant are 0; set one of {states}"
+        raise refuse(refusal((), given, still, "sentence"))
     return options
 
 
@@ -67,7 +72,7 @@ def initial_condition(value: Any, info: ValidationInfo) -> Strict:
 def states_schema(names: tuple[str, ...]) -> type[Strict]:
     """The schema of an initial condition; states that are not given are 0."""
     fields: dict[str, Any] = {"units": (Literal["dimensionless", "si"], "dimensionless")}
-    fields |= {name: (Number, 0.0) for name in names}
+    fields |= dict.fromkeys(names, (Number, 0.0))
     return create_model("InitialCondition", __base__=Strict, **fields)
 
 
@@ -85,19 +90,19 @@ def measures(value: Any) -> dict[str, Strict]:
         if name not in registry.names("measures"):
             raise refuse(unknown((), entry, registry.names("measures")))
         factory = named_factory("measures", name)
-        options = options_of(factory, named=False).model_validate({} if entry is None else plain(entry))
+        options = options_of(factory).model_validate({} if entry is None else plain(entry))
         construct(factory, options)
         return options
 
     return each(value, measure)
 
 
-def survey(value: Any, info: ValidationInfo, built_in: Mapping[str, type[Strict]]) -> Strict:
+def survey(value: Any, info: ValidationInfo, built_in: Mapping[str, type[Typed]]) -> Typed:
     """A survey; the axes of a grid are checked against the law's parameters."""
     value = plain(value)
     factory = factory_of("surveys", value)
     if value["type"] not in built_in:
-        return options_of(factory, omitted=("parameters",)).model_validate(value)
+        return typed_options_of(factory, omitted=("parameters",)).model_validate(value)
     options = built_in[value["type"]].model_validate(value)
     parameters = parameters_of(info.data)
     if value["type"] == "grid":
@@ -110,12 +115,16 @@ def survey(value: Any, info: ValidationInfo, built_in: Mapping[str, type[Strict]
 def plant_of(data: Mapping[str, Any]) -> LinearPlant | None:
     """The plant of the fields validated so far, None if it is wrong."""
     options = data.get("plant")
-    return None if options is None else construct(registry.load("plants", options.type), options)  # type: ignore[no-any-return]
+    if options is None:
+        return None
+    plant: LinearPlant = construct(registry.load("plants", options.type), options)
+    return plant
 
 
 def parameters_of(data: Mapping[str, Any]) -> dict[str, Parameter] | None:
     """The law's parameters by name, None if the plant or the controller is wrong."""
-    plant, options = plant_of(data), data.get("controller")
+    plant = plant_of(data)
+    options = data.get("controller")
     if plant is None or options is None:
         return None
     law = registry.load("controllers", options.type)
@@ -136,7 +145,7 @@ def plain(value: Any) -> Any:
 def _within(parameter: Parameter) -> Callable[[float], float]:
     def check(value: float) -> float:
         if not parameter.contains(value):
-            raise PydanticCustomError("refused", parameter.allowed)  # type: ignore[arg-type]
+            raise PydanticCustomError("refused", parameter.allowed)
         return value
 
     return check

@@ -6,23 +6,23 @@ import re
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BeforeValidator, Field, PlainValidator, SerializeAsAny, ValidationInfo
+from pydantic import AfterValidator, Field, PlainValidator, SerializeAsAny, ValidationInfo
 from pydantic_core import InitErrorDetails
 
 from fracctl.config import parts
-from fracctl.config.fields import Folder, Name, Number, Strict, Whole, refusal, refuse
+from fracctl.config.fields import Folder, Name, Number, Strict, Typed, Whole, refusal, refuse
 from fracctl.errors import suggestion
 
 _COLUMN = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
 
-class SingleSurvey(Strict):
+class SingleSurvey(Typed):
     """One design point: the controller as it stands."""
 
     type: Literal["single"]
 
 
-class GridSurvey(Strict):
+class GridSurvey(Typed):
     """The product of axes."""
 
     type: Literal["grid"]
@@ -30,17 +30,17 @@ class GridSurvey(Strict):
     """``start:stop:step``, a number, or a list of values, by design variable."""
     slice: str | None = None
     """The design variable for each value of which an optimum is stored."""
-    baseline: dict[str, Number] = {}
+    baseline: dict[str, Number] = Field(default_factory=dict)
     """Values that the point has with which the optimum is compared."""
 
 
-class SerialScheduler(Strict):
+class SerialScheduler(Typed):
     """Everything in the calling process."""
 
     type: Literal["serial"] = "serial"
 
 
-class LocalScheduler(Strict):
+class LocalScheduler(Typed):
     """Worker processes on this machine."""
 
     type: Literal["local"] = "local"
@@ -48,7 +48,7 @@ class LocalScheduler(Strict):
     """How many; None for one a core."""
 
 
-class Figure(Strict):
+class Figure(Typed):
     """One figure of the run."""
 
     type: Literal["gain_contours", "trajectories", "objective_against_order"]
@@ -58,15 +58,15 @@ class Figure(Strict):
     """Which are shown; None for all."""
 
 
-SURVEYS: Mapping[str, type[Strict]] = {"single": SingleSurvey, "grid": GridSurvey}
-SCHEDULERS: Mapping[str, type[Strict]] = {"serial": SerialScheduler, "local": LocalScheduler}
+SURVEYS: Mapping[str, type[Typed]] = {"single": SingleSurvey, "grid": GridSurvey}
+SCHEDULERS: Mapping[str, type[Typed]] = {"serial": SerialScheduler, "local": LocalScheduler}
 
 
-def _survey(value: Any, info: ValidationInfo) -> Strict:
+def _survey(value: Any, info: ValidationInfo) -> Typed:
     return parts.survey(value, info, SURVEYS)
 
 
-def _scheduler(value: Any) -> Strict:
+def _scheduler(value: Any) -> Typed:
     given = parts.plain(value)
     name = given.get("type") if isinstance(given, Mapping) else None
     if name not in SCHEDULERS:
@@ -80,7 +80,8 @@ def _objectives(value: dict[str, list[str]], info: ValidationInfo) -> dict[str, 
     lines = []
     for name, factors in value.items():
         if not _COLUMN.fullmatch(name):
-            lines.append(refusal((name,), factors, "an objective's name consists of letters, digits and '_'", "sentence"))
+            allowed = "an objective's name consists of letters, digits and '_'"
+            lines.append(refusal((name,), factors, allowed, "sentence"))
         if not factors:
             lines.append(refusal((name,), factors, "must name at least one measure"))
         for factor in factors:
@@ -121,7 +122,8 @@ def _absent(field: str, name: str, path: tuple[str, ...], info: ValidationInfo) 
     return [] if name in known else [refusal(path, name, allowed)]
 
 
-Part = SerializeAsAny[Strict]
+Part = SerializeAsAny[Typed]
+Options = SerializeAsAny[Strict]
 
 
 class RunConfig(Strict):
@@ -132,12 +134,12 @@ class RunConfig(Strict):
     controller: Annotated[Part, PlainValidator(parts.controller)]
     """`type` and the parameters of the law, which are columns of the tables."""
     initial_condition: Annotated[
-        dict[Name, Annotated[Part, PlainValidator(parts.initial_condition)]], Field(min_length=1)
+        dict[Name, Annotated[Options, PlainValidator(parts.initial_condition)]], Field(min_length=1)
     ]
     """`units` and values of the states, by name."""
     solver: Annotated[Part, PlainValidator(parts.registered)]
     """`type` and the options of the solver."""
-    measures: Annotated[dict[str, Part], PlainValidator(parts.measures)]
+    measures: Annotated[dict[str, Options], PlainValidator(parts.measures)]
     """Options of the measures, by name."""
     objectives: Annotated[dict[str, list[str]], AfterValidator(_objectives)]
     """Measure columns by the name of the objective that is their geometric mean."""
@@ -147,7 +149,7 @@ class RunConfig(Strict):
     """Which design points are evaluated."""
     scheduler: Annotated[Part, PlainValidator(_scheduler)] = SerialScheduler()
     """Where."""
-    figures: Annotated[dict[Name, Figure], AfterValidator(_figures)] = {}
+    figures: Annotated[dict[Name, Figure], AfterValidator(_figures)] = Field(default_factory=dict)
     """By file name."""
     horizon_periods: Annotated[Number, Field(gt=0.0)] = 6.0
     """Simulated time in units of 2π."""

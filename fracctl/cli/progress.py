@@ -1,0 +1,58 @@
+"""How far a run is, on standard error: rows done, rate, time left."""
+
+from __future__ import annotations
+
+import sys
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from fracctl.execution.progress import Progress
+
+
+def display(label: str, quiet: bool) -> Progress:
+    """Return a progress display; a silent one if asked, or if standard error is no terminal."""
+    from fracctl.execution.progress import NoProgress
+
+    if quiet or sys.stderr is None or not sys.stderr.isatty():
+        return NoProgress()
+    return Bar(label)
+
+
+class Bar:
+    """A bar that vanishes at the end.
+
+    Args:
+        label: what is running.
+    """
+
+    def __init__(self, label: str) -> None:
+        from rich.console import Console
+        from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
+        from rich.progress import Progress as Rich
+
+        self._rich = Rich(
+            TextColumn("{task.description}", markup=False),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TextColumn("{task.fields[rate]}"),
+            TimeRemainingColumn(compact=True, elapsed_when_finished=True),
+            console=Console(stderr=True),
+            transient=True,
+            speed_estimate_period=10.0,
+        )
+        self._task = self._rich.add_task(label, total=None, rate="")
+
+    def start(self, total_rows: int | None) -> None:
+        """Show the bar; without a total it only counts."""
+        self._rich.update(self._task, total=total_rows)
+        self._rich.start()
+
+    def advance(self, rows: int) -> None:
+        """Add rows."""
+        speed = self._rich.tasks[0].speed
+        rate = f"{speed:,.0f} rows/s".replace(",", " ") if speed else ""
+        self._rich.update(self._task, advance=rows, rate=rate)
+
+    def finish(self) -> None:
+        """Remove the bar."""
+        self._rich.stop()

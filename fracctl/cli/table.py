@@ -1,0 +1,86 @@
+"""Plain tables: columns of text, never wrapped, the same on a terminal and in a file."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+TURN = 2.0 * math.pi
+
+_AFTER_THE_MEASURES = "objective"
+
+
+def table(rows: Sequence[Sequence[str]], indent: str = "  ") -> list[str]:
+    """Return lines with aligned columns; rows may have different lengths."""
+    columns = max((len(row) for row in rows), default=0)
+    filled = [[*row, *[""] * (columns - len(row))] for row in rows]
+    widths = [max(len(row[i]) for row in filled) for i in range(columns)]
+    return [
+        (indent + "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True))).rstrip()
+        for row in filled
+    ]
+
+
+def result_table(summary: Mapping[str, Any], objectives: Mapping[str, Sequence[str]]) -> list[str]:
+    """Return the optimum and the baseline of every objective and initial condition of a run's summary."""
+    results = summary.get("optima") or [summary]
+    lines = []
+    for name in dict.fromkeys(result.get("objective_name") for result in results):
+        of_name = [result for result in results if result.get("objective_name") == name]
+        factors = objectives.get(str(name), ())
+        lines.append(_title(name, factors))
+        lines += table([row for result in of_name for row in _rows(result, name, factors, result is of_name[0])])
+    return lines
+
+
+def number(value: Any, digits: int = 6) -> str:
+    """A number for reading; anything else as text."""
+    if value is None:
+        return "-"
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return str(value)
+    return f"{value:.{digits}g}"
+
+
+def _title(name: str | None, factors: Sequence[str]) -> str:
+    if name is None or len(factors) < 2:
+        return str(name or "result")
+    return f"{name} = ({' · '.join(factors)})^(1/{len(factors)})"
+
+
+def _rows(result: Mapping[str, Any], name: str | None, factors: Sequence[str], first: bool) -> Iterator[list[str]]:
+    optimum, baseline, change = result["optimum"], result["baseline"], result["change_percent"]
+    condition = str(result.get("initial_condition") or "")
+    if optimum is None:
+        yield [condition, "no optimum"]
+        return
+    columns = _columns(optimum) + ([f"objective_{name}"] if len(factors) > 1 else [])
+    if first:
+        yield ["", "", *[heading for column in columns for heading in _heading(column, name)]]
+    for label, values in (("optimum", optimum), ("baseline", baseline)):
+        if values is not None:
+            shown = [cell for column in columns for cell in _cells(column, values.get(column))]
+            yield [condition if label == "optimum" else "", label, *shown]
+    if change is not None:
+        yield ["", "change", f"{change:+.1f} %".replace("-", "−")]
+
+
+def _columns(row: Mapping[str, Any]) -> list[str]:
+    """Design variables and measures: the columns before the objective's."""
+    names = list(row)
+    end = names.index(_AFTER_THE_MEASURES) if _AFTER_THE_MEASURES in names else len(names)
+    return [name for name in names[:end] if name != "initial_condition"]
+
+
+def _heading(column: str, name: str | None) -> list[str]:
+    if column == "settling_time":
+        return [column, ""]
+    return [str(name)] if column == f"objective_{name}" else [column]
+
+
+def _cells(column: str, value: Any) -> list[str]:
+    """The settling time stands in units of T = 2π too."""
+    if column != "settling_time":
+        return [number(value)]
+    return [number(value), "" if value is None else f"{value / TURN:.4f} T"]

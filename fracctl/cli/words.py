@@ -1,0 +1,149 @@
+"""A run in words: every part with its numbers and, where the plant has scales, in SI units."""
+
+from __future__ import annotations
+
+import inspect
+import math
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from fracctl.cli.table import number, table
+from fracctl.config.schemas import GridSurvey, RunConfig
+from fracctl.evaluation import Evaluation
+from fracctl.plants import Chief, LinearPlant
+from fracctl.store.identity import run_id
+from fracctl.surveys import Survey, axis_values
+from fracctl.units import Scales
+
+_Row = tuple[str, str]
+
+
+def explain(config: RunConfig, evaluation: Evaluation, survey: Survey) -> list[str]:
+    """Return the lines that explain a run."""
+    rows = [
+        *_plant(config, evaluation.plant),
+        *_law(config, evaluation),
+        *_initial_conditions(evaluation),
+        ("horizon", _time(evaluation.horizon, evaluation.plant.scales)),
+        ("solver", _sentence(evaluation.solver, config.solver.type, _options(config.solver))),
+        *_measures(config, evaluation),
+        *_objectives(config),
+        *_survey(config, evaluation, survey),
+        ("scheduler", _scheduler(config)),
+        ("figures", ", ".join(config.figures) or "none"),
+        ("stored in", str(_directory(config))),
+    ]
+    return [config.name, *table([[name, text] for name, text in rows])]
+
+
+def _plant(config: RunConfig, plant: LinearPlant) -> Iterator[_Row]:
+    yield "plant", _sentence(plant, config.plant.type, "")
+    chief = getattr(plant, "chief", None)
+    if isinstance(chief, Chief):
+        orbit = f"circular orbit, radius {number(chief.semi_major_axis_km)} km"
+        yield "", f"chief on a {orbit}, inclination {number(chief.inclination_deg)}°"
+    scales = plant.scales
+    if scales is None:
+        yield "", "dimensionless; T = 2π"
+        return
+    units = f"length {number(scales.length_m)} m, time {number(scales.time_s)} s"
+    yield "", f"1 stands for {units}, speed {number(scales.speed_m_s)} m/s"
+    acceleration = f"acceleration {number(scales.acceleration_m_s2)} m/s²"
+    yield "", f"{acceleration}; one period T = 2π = {number(scales.period_s / 3600.0)} h"
+
+
+def _law(config: RunConfig, evaluation: Evaluation) -> Iterator[_Row]:
+    values = ", ".join(f"{name} = {number(evaluation.parameters[name])}" for name in evaluation.design_variables)
+    yield "controller", _sentence(evaluation.law, config.controller.type, "")
+    for equation in _equation(evaluation.law):
+        yield "", equation
+    yield "", values
+
+
+def _initial_conditions(evaluation: Evaluation) -> Iterator[_Row]:
+    plant = evaluation.plant
+    for place, (name, state) in enumerate(evaluation.initial_conditions.items()):
+        values = zip(plant.state_names, state.tolist(), strict=True)
+        text = ", ".join(f"{state} = {_state(state, value, plant.scales)}" for state, value in values if value)
+        yield "" if place else "starts from", f"{name}: {text}"
+
+
+def _measures(config: RunConfig, evaluation: Evaluation) -> Iterator[_Row]:
+    measures = zip(config.measures.items(), evaluation.measures, strict=True)
+    for place, ((name, options), measure) in enumerate(measures):
+        text = _options(options)
+        threshold = getattr(options, "threshold", None)
+        if evaluation.plant.scales is not None and isinstance(threshold, float):
+            text += f" ({number(threshold * evaluation.plant.scales.length_m)} m)"
+        yield "" if place else "measures", _sentence(measure, name, text)
+
+
+def _objectives(config: RunConfig) -> Iterator[_Row]:
+    names = sorted(config.objectives, key=lambda name: name != config.objective)
+    for place, name in enumerate(names):
+        factors = config.objectives[name]
+        mean = f" = ({' · '.join(factors)})^(1/{len(factors)})" if len(factors) > 1 else ""
+        yield "" if place else "minimises", f"{name}{mean}" + ("" if place else " (primary)")
+
+
+def _survey(config: RunConfig, evaluation: Evaluation, survey: Survey) -> Iterator[_Row]:
+    conditions = len(evaluation.initial_conditions)
+    points = survey.n_points
+    many = "as many design points as it needs" if points is None else _count(points, "design point")
+    yield "survey", f"{config.survey.type}: {many}, {_count(conditions, 'initial condition')}"
+    if not isinstance(config.survey, GridSurvey):
+        return
+    for name, spec in config.survey.axes.items():
+        values = axis_values(spec, name)
+        yield "", f"{name} from {number(values[0])} to {number(values[-1])}, {len(values)} values"
+    if survey.slice is not None:
+        yield "", f"the best point is kept for each {survey.slice}"
+    if survey.baseline:
+        wanted = ", ".join(f"{name} = {number(value)}" for name, value in survey.baseline.items())
+        yield "", f"compared with the best point of {wanted}"
+
+
+def _count(number_of: int, what: str) -> str:
+    return f"{number_of} {what}" + ("" if number_of == 1 else "s")
+
+
+def _scheduler(config: RunConfig) -> str:
+    if config.scheduler.type == "serial":
+        return "serial: in this process"
+    workers = getattr(config.scheduler, "workers", None)
+    return f"{config.scheduler.type}: {workers or 'as many worker processes as cores'}"
+
+
+def _directory(config: RunConfig) -> Path:
+    return Path(config.output_dir).absolute() / config.name / run_id(config.model_dump(mode="json"))
+
+
+def _sentence(thing: Any, name: str, options: str) -> str:
+    """Name, options, and the first sentence of a docstring."""
+    described = (inspect.getdoc(thing) or "").partition("\n")[0].rstrip(".")
+    return f"{name}" + (f", {options}" if options else "") + (f": {described}" if described else "")
+
+
+def _equation(thing: Any) -> list[str]:
+    """The first displayed equation of a docstring, if any."""
+    lines = (inspect.getdoc(thing) or "").partition("Args:")[0].splitlines()
+    return [line.partition("  (")[0].strip() for line in lines if line.startswith("    ")][:1]
+
+
+def _options(options: Any) -> str:
+    given: Mapping[str, Any] = options.model_dump(exclude={"type"})
+    return ", ".join(f"{name} {number(value)}" for name, value in given.items() if value is not None)
+
+
+def _time(value: float, scales: Scales | None) -> str:
+    hours = "" if scales is None else f" = {number(value * scales.time_s / 3600.0)} h"
+    return f"{number(value / (2.0 * math.pi))} T{hours}"
+
+
+def _state(name: str, value: float, scales: Scales | None) -> str:
+    if scales is None:
+        return number(value)
+    rate = name.endswith("_dot")
+    unit = scales.speed_m_s if rate else scales.length_m
+    return f"{number(value)} ({number(value * unit)} {'m/s' if rate else 'm'})"

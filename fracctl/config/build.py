@@ -1,0 +1,87 @@
+"""From a validated configuration to the objects of a run."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from fracctl.arrays import Floats
+from fracctl.config import registry
+from fracctl.config.options import construct
+from fracctl.config.schemas import GridSurvey, RunConfig, SingleSurvey
+from fracctl.errors import ConfigurationError
+from fracctl.evaluation import Evaluation
+from fracctl.plants import LinearPlant
+from fracctl.surveys import Grid, Single, Survey, axis_values
+
+
+def build_evaluation(config: RunConfig) -> Evaluation:
+    """Return what turns design points into rows."""
+    plant = build_plant(config)
+    return Evaluation(
+        plant=plant,
+        law=registry.load("controllers", config.controller.type),
+        parameters=build_parameters(config),
+        initial_conditions=build_initial_conditions(config, plant),
+        solver=construct(registry.load("solvers", config.solver.type), config.solver),
+        measures=tuple(
+            construct(registry.load("measures", name), options) for name, options in config.measures.items()
+        ),
+        objectives={name: tuple(columns) for name, columns in config.objectives.items()},
+        objective=config.objective,
+        horizon=2.0 * math.pi * config.horizon_periods,
+    )
+
+
+def build_survey(config: RunConfig, evaluation: Evaluation) -> Survey:
+    """Return what decides which design points are evaluated."""
+    parameters = evaluation.parameters
+    survey = config.survey
+    if isinstance(survey, SingleSurvey):
+        return Single({name: parameters[name] for name in evaluation.design_variables})
+    if isinstance(survey, GridSurvey):
+        axes = {name: axis_values(spec, name) for name, spec in survey.axes.items()}
+        fixed = {name: parameters[name] for name in evaluation.design_variables if name not in axes}
+        return Grid(axes, survey.slice, survey.baseline, fixed)
+    built: Survey = construct(registry.load("surveys", survey.type), survey, parameters=parameters)
+    return built
+
+
+def build_checked(config: RunConfig) -> tuple[Evaluation, Survey]:
+    """Return evaluation and survey of a run that can be computed.
+
+    Raises:
+        ConfigurationError: the solver does not take such a loop.
+    """
+    evaluation = build_evaluation(config)
+    refused = evaluation.solver.supports(evaluation.loop({}))
+    if refused is not None:
+        raise ConfigurationError(f"solver.type = {config.solver.type}: {refused}")
+    return evaluation, build_survey(config, evaluation)
+
+
+def build_plant(config: RunConfig) -> LinearPlant:
+    """Return the plant."""
+    plant: LinearPlant = construct(registry.load("plants", config.plant.type), config.plant)
+    return plant
+
+
+def build_parameters(config: RunConfig) -> dict[str, float]:
+    """Return the values of the law's parameters."""
+    return {name: value for name, value in config.controller if name != "type"}
+
+
+def build_initial_conditions(config: RunConfig, plant: LinearPlant) -> dict[str, Floats]:
+    """Return the dimensionless initial states, (2m,), by name."""
+    return {name: _state(options.model_dump(), plant) for name, options in config.initial_condition.items()}
+
+
+def _state(given: Mapping[str, Any], plant: LinearPlant) -> Floats:
+    state = np.array([given[name] for name in plant.state_names], dtype=np.float64)
+    if given["units"] == "si" and plant.scales is not None:
+        m = len(plant.components)
+        state /= np.repeat([plant.scales.length_m, plant.scales.speed_m_s], m)
+    return state
