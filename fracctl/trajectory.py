@@ -28,6 +28,8 @@ class Trajectory:
     """ξ at the nodes, (b, m, T)."""
     controls_at_nodes: Floats
     """υ at the nodes, (b, m, T)."""
+    initial_controls: Floats
+    """υ(0+), (b, m); a law with order α < 1 rises from it as t^(1-α)."""
     rates: Floats
     """ξ' at the nodes, (b, m, T)."""
     auxiliary: Floats
@@ -87,7 +89,9 @@ class Trajectory:
         Raises:
             ArgumentError: a time lies outside [0, horizon].
         """
-        out = np.swapaxes(self.grid.evaluate(self.controls_at_nodes, self._checked(times)), 1, 2)
+        t = self._checked(times)
+        out = np.swapaxes(self.grid.evaluate(self.controls_at_nodes, t), 1, 2)
+        out[:, t == 0.0] = self.initial_controls[:, None]
         return out if self.batched else out[0]
 
     @property

@@ -144,7 +144,7 @@ class Contour:
         for attempt, (width, safety) in enumerate([(_FIRST_HULL, 0.03), (1.1, 0.003), (1.5, 0.001)]):
             missed: list[Array] = []
             for group in _hull_classes(rows, radius, shift, width, 1.5 if attempt else 1.25):
-                plan = make_plan(horizon, group.hull, group.radius, group.shift, max(safety * self.tolerance, 3e-13))
+                plan = make_plan(horizon, group.hull, group.radius, group.shift, max(safety * self.tolerance, 1e-12))
                 cost[group.rows] += plan.nodes
                 pick = members[group.rows] if y0.shape[1] > 1 else slice(None)
                 response = respond(system.take(group.rows), y0[:, pick], rate[:, pick], plan, with_rates)
@@ -247,6 +247,7 @@ def _packed(
         initial_state=flat(start),
         positions=flat(response.positions),
         controls_at_nodes=flat(response.controls),
+        initial_controls=flat(response.initial_controls),
         rates=flat(rates),
         auxiliary=flat(response.auxiliary),
         status=np.tile(status, k),
@@ -277,6 +278,7 @@ def _without_trajectory(
         initial_state=start.reshape(k * b, -1),
         positions=blank,
         controls_at_nodes=blank,
+        initial_controls=blank[..., 0],
         rates=blank,
         auxiliary=np.full((k * b, system.n_auxiliary, len(grid.times)), np.nan),
         status=np.full(k * b, "diverged" if diverged else "unstable", dtype=object),
@@ -311,6 +313,7 @@ def _merged(parts: list[Survey], batch: int) -> Trajectory:
         initial_state=gather("initial_state", False),
         positions=gather("positions", True),
         controls_at_nodes=gather("controls_at_nodes", True),
+        initial_controls=gather("initial_controls", False),
         rates=gather("rates", True),
         auxiliary=gather("auxiliary", True),
         status=gather("status", False),

@@ -15,9 +15,12 @@ from functools import lru_cache
 import numpy as np
 
 from fracctl.arrays import Complexes, Floats
+from fracctl.errors import UnsupportedError
 
 ROUNDING = 1e-15
 """Rounding error of F that e^{c t} may amplify up to the tolerance."""
+SMALLEST_RANGE = 7.0
+"""Least bound on c that is allowed, whatever the tolerance."""
 
 
 @dataclass(frozen=True)
@@ -54,12 +57,15 @@ def design(tolerance: float, ratio: float, height: float) -> ContourShape:
         tolerance: error of the quadrature relative to the largest value of the function.
         ratio: Λ, last over first time of the window.
         height: largest imaginary part of the poles times the last time.
+
+    Raises:
+        UnsupportedError: no contour of the mesh is high enough.
     """
     decades = -np.log(tolerance)
-    c = np.linspace(1.0, np.log(tolerance / ROUNDING), 16)[:, None, None, None]
-    nu = np.geomspace(1e-3, 60.0, 32)[:, None, None]
-    y = np.linspace(0.1, 1.3, 20)[:, None]
-    kappa = np.linspace(0.1, 1.0, 16) * (c + nu * (1.0 - np.cos(y))) / y
+    c = np.linspace(1.0, max(np.log(tolerance / ROUNDING), SMALLEST_RANGE), 10)[:, None, None, None]
+    nu = np.geomspace(1e-3, 60.0, 20)[:, None, None]
+    y = np.geomspace(0.02, 1.2, 18)[:, None]
+    kappa = np.linspace(0.1, 1.0, 10) * (c + nu * (1.0 - np.cos(y))) / y
     middle, bend = c + nu - kappa * y, nu * np.cos(y)
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         above_pole = np.arccosh(np.maximum(middle / bend, 1.0))
@@ -70,6 +76,11 @@ def design(tolerance: float, ratio: float, height: float) -> ContourShape:
         count = np.arccosh(1.0 + (c + decades * ratio) / nu) / step
         count = np.where(covers & clears_cut, count, np.inf)
     best = np.unravel_index(np.argmin(count), count.shape)
+    if not np.isfinite(count[best]):
+        raise UnsupportedError(
+            f"poles times horizon reach {height:.3g} rad, too many oscillations for the contour solver; "
+            "shorten the horizon or lower the gains"
+        )
     nodes = int(np.ceil(count[best]))
     shape = (c[best[0], 0, 0, 0], nu[best[1], 0, 0], kappa[best], step[best])
     return ContourShape(*(float(value) for value in shape), nodes)
@@ -77,6 +88,6 @@ def design(tolerance: float, ratio: float, height: float) -> ContourShape:
 
 def _downward_step(c: Floats, nu: Floats, kappa: Floats, decades: float) -> Floats:
     """Return the largest step whose error from below the real axis, e^{max Re σ t - 2πy/h}, meets the tolerance."""
-    steps = [2.0 * np.pi * y / (c + nu * (1.0 - np.cos(y)) + kappa * y + decades) for y in np.linspace(0.1, 1.5, 15)]
+    steps = [2.0 * np.pi * y / (c + nu * (1.0 - np.cos(y)) + kappa * y + decades) for y in np.linspace(0.3, 1.5, 9)]
     largest: Floats = np.max(steps, axis=0)
     return largest

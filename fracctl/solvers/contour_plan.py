@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass, field
 from functools import lru_cache
 
@@ -11,7 +12,8 @@ from fracctl.arrays import Array, Complexes, Floats
 from fracctl.panels import Panel, PanelGrid
 from fracctl.solvers.contour_design import ContourShape, design
 
-LARGEST_RATIO = 8.0
+RATIOS = (3.0, 4.0, 5.0, 6.0, 7.0, 8.0)
+"""Last over first time of a window; few values, so that few contours are designed."""
 SERIES_REACH = 0.012
 """Time, times the pole radius, up to which the solution is taken from its power series."""
 SERIES_START = 1e-7
@@ -89,18 +91,18 @@ def make_plan(horizon: float, hull: float, radius: float, shift: float, toleranc
         tolerance: relative error of the quadrature.
     """
     reach = max(horizon * (radius + shift) / SERIES_REACH, 2.0)
-    count = int(np.ceil(np.log(reach) / np.log(LARGEST_RATIO)))
-    ratio = reach ** (1.0 / count)
+    count = int(np.ceil(np.log(reach) / np.log(RATIOS[-1])))
+    ratio = next(r for r in RATIOS if r**count >= reach)
     edges = horizon * ratio ** np.arange(-count, 1.0)
     edges[-1] = horizon
     panels = [Panel(float(edges[0] * SERIES_START), float(edges[0]), SERIES_NODES, logarithmic=True)]
-    groups = [_panels(float(a), float(b), hull, tolerance) for a, b in zip(edges, edges[1:], strict=False)]
+    groups = [_panels(float(a), float(b), hull, tolerance) for a, b in itertools.pairwise(edges)]
     grid = PanelGrid([*panels, *(panel for group in groups for panel in group)])
     windows, first = [], 1
     for group in groups:
         where = slice(int(grid.offsets[first]), int(grid.offsets[first + len(group)]))
         first += len(group)
-        shape = design(tolerance, round(ratio, 3) + 1e-3, _rounded_up(hull * group[-1].end))
+        shape = design(tolerance, ratio, _rounded_up(hull * group[-1].end))
         windows.append(_window(shape, where, grid.times[where], radius, shift))
     return Plan(grid, tuple(windows))
 
@@ -115,7 +117,7 @@ def _panels(start: float, end: float, hull: float, tolerance: float) -> list[Pan
     count = int(np.ceil(0.5 * hull * (end - start) / _LONGEST))
     edges = np.linspace(start, end, max(count, 1) + 1)
     panels = []
-    for a, b in zip(edges, edges[1:], strict=False):
+    for a, b in itertools.pairwise(edges):
         half, centre = 0.5 * (b - a), 0.5 * (b + a)
         ellipse = centre / half + np.sqrt((centre / half) ** 2 - 1.0)
         smooth = -np.log(tolerance) / np.log(ellipse)

@@ -36,6 +36,8 @@ class Response:
     """(k, b, q, T)."""
     controls: Floats
     """(k, b, m, T)."""
+    initial_controls: Floats
+    """υ(0+), (k, b, m)."""
     error: Floats
     """Difference of the two quadrature rules, interpolation and series remainders over the peak, (k, b)."""
     enclosed: Booleans
@@ -62,8 +64,9 @@ def respond(system: LinearFractionalSystem, y0: Floats, y0_rate: Floats, plan: P
             if np.any(term.matrix[..., column]):
                 wanted = _Derivative(column, term.orders[..., column])
                 places.append((j, column, _index(orders, wanted)))
-    values, differences, enclosed = _derivatives(system, y0, y0_rate, plan, orders)
+    values, differences, initial, enclosed = _derivatives(system, y0, y0_rate, plan, orders)
     controls, control_difference = _controls(system, places, values, differences)
+    initial_controls = _controls(system, places, initial, differences)[0][..., 0]
     positions = np.moveaxis(values[:m], 0, 2)
     tail = plan.grid.tail
     error = np.maximum(
@@ -72,7 +75,7 @@ def respond(system: LinearFractionalSystem, y0: Floats, y0_rate: Floats, plan: P
     )
     rates = np.moveaxis(values[p : p + m], 0, 2) if with_rates else None
     auxiliary = np.moveaxis(values[m:p], 0, 2)
-    return Response(positions, rates, auxiliary, controls, error, enclosed)
+    return Response(positions, rates, auxiliary, controls, initial_controls, error, enclosed)
 
 
 def _index(orders: list[_Derivative], wanted: _Derivative) -> int:
@@ -116,13 +119,13 @@ def _controls(
 
 def _derivatives(
     system: LinearFractionalSystem, y0: Floats, y0_rate: Floats, plan: Plan, orders: list[_Derivative]
-) -> tuple[Floats, Floats, Booleans]:
-    """Return all derivatives on the grid (w, k, b, T), rule differences (w, k, b, windows), enclosure (b,)."""
+) -> tuple[Floats, Floats, Floats, Booleans]:
+    """Return all derivatives on the grid (w, k, b, T), differences (w, k, b, c), values at 0+ (w, k, b, 1), enclosure."""
     matrix = CharacteristicMatrix(system)
     k, b, _ = y0.shape
     values = np.empty((len(orders), k, b, len(plan.grid.times)))
     differences = np.empty((len(orders), k, b, len(plan.windows) + 1))
-    _start(system, y0, y0_rate, plan, orders, values, differences)
+    initial = _start(system, y0, y0_rate, plan, orders, values, differences)
     enclosed = np.ones(b, dtype=bool)
     for number, window in enumerate(plan.windows):
         transforms, inside = _transforms(matrix, y0, y0_rate, window)
@@ -132,9 +135,9 @@ def _derivatives(
             main, ends = _inverse(window, transform, wanted.order, float(system.highest[wanted.component]))
             checked = np.abs(main[..., window.checked] - ends).max(axis=-1)
             differences[i, :, :, number + 1] = checked
-            initial = _initial_value(wanted, y0, y0_rate, window.times)
-            values[i, :, :, window.where] = main if initial is None else main + initial
-    return values, differences, enclosed
+            added = _initial_value(wanted, y0, y0_rate, window.times)
+            values[i, :, :, window.where] = main if added is None else main + added
+    return values, differences, initial, enclosed
 
 
 def _start(
@@ -145,17 +148,20 @@ def _start(
     orders: list[_Derivative],
     values: Floats,
     differences: Floats,
-) -> None:
-    """Fill the first panel from the power series, and the first column of `differences` with its remainder."""
+) -> Floats:
+    """Fill the first panel from the power series, the first column of `differences` with its remainder; values at 0+."""
     panel = plan.grid.panels[0]
     times = plan.grid.times[: panel.nodes]
     series = short_time_series(system, y0, y0_rate, SERIES_ORDER)
+    initial = np.empty((*values.shape[:-1], 1))
     for i, wanted in enumerate(orders):
         values[i, :, :, : panel.nodes] = series.derivative(wanted.component, wanted.order, times)
         # the omitted power, differentiated: Γ(e + 1) / Γ(e - γ + 1) grows at most as e^γ
         order = np.maximum(wanted.order, 0.0)
         growth = panel.end ** (series.cut - order) * (series.cut + 1.0) ** order
         differences[i, :, :, 0] = series.remainder * growth
+        initial[i] = series.derivative(wanted.component, wanted.order, np.zeros(1))
+    return initial
 
 
 def _transforms(
