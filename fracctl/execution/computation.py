@@ -11,13 +11,16 @@ from typing import Any
 import numpy as np
 
 from fracctl.errors import RunError
+from fracctl.evaluation import COUNTERS
 from fracctl.execution.drawing import draw_figures
 from fracctl.execution.executors import make_executor, n_workers
 from fracctl.execution.progress import Progress
 from fracctl.execution.record import Record, run_log
-from fracctl.execution.row_store import RowStore, counters, evaluations_schema
+from fracctl.execution.row_store import RowStore, evaluations_schema
 from fracctl.execution.scheduler import Scheduler
 from fracctl.execution.summary import Tally, notes_on, results, summarise
+from fracctl.execution.tails import notes_on_tails
+from fracctl.execution.trajectories import trajectories
 from fracctl.execution.worker import Work, describe
 from fracctl.store.columns import schema
 from fracctl.store.files import remove_tree
@@ -105,6 +108,7 @@ class Computation:
         notes = self._notes + notes_on(found, self._survey.baseline, tally)
         if store.damaged:
             notes.append(f"stored parts that could not be trusted and were computed again: {store.damaged}")
+        notes += notes_on_tails(self._evaluation, found)
         notes += draw_figures(self._directory, self._job.configuration["figures"])
         identity = {
             "experiment": str(self._job.configuration["name"]),
@@ -144,14 +148,12 @@ class Computation:
             selection.add(rows)
         optima = selection.rows()
         columns = ("kind", "slice", "objective_name", *table.names)
-        self._directory.write_optima(schema(columns, counters(evaluation), self._metadata), optima)
+        self._directory.write_optima(schema(columns, COUNTERS, self._metadata), optima)
         return tally, optima
 
     def _trajectories(self) -> None:
         optima = self._directory.optima()
         shown = optima[optima["kind"].isin(TRAJECTORY_KINDS)]
-        rows = {"run": np.zeros(0, dtype=np.int64), "time": np.zeros(0)}
-        if len(shown):
-            times = np.linspace(0.0, self._evaluation.horizon, TRAJECTORY_SAMPLES)
-            rows = dict(self._evaluation.trajectories(shown, times))
+        times = np.linspace(0.0, self._evaluation.horizon, TRAJECTORY_SAMPLES)
+        rows = trajectories(self._evaluation, shown, times)
         self._directory.write_trajectories(schema(tuple(rows), metadata=self._metadata), rows)

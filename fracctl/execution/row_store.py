@@ -10,7 +10,8 @@ import numpy as np
 import pyarrow as pa
 
 from fracctl.arrays import Array
-from fracctl.execution.worker import Evaluator, Outcome
+from fracctl.evaluation import COUNTERS, Evaluation
+from fracctl.execution.worker import Outcome
 from fracctl.store.columns import POINT, REASON, schema
 from fracctl.store.parts import Parts
 from fracctl.store.run_directory import RunDirectory
@@ -23,21 +24,15 @@ FAILED = "failed"
 _log = logging.getLogger(__name__)
 
 
-def evaluations_schema(evaluation: Evaluator, metadata: Mapping[str, str]) -> pa.Schema:
+def evaluations_schema(evaluation: Evaluation, metadata: Mapping[str, str]) -> pa.Schema:
     """Return the schema of ``evaluations.parquet``: `point`, the evaluation's columns, `reason`."""
-    return schema((POINT, *evaluation.row_columns, REASON), counters(evaluation), metadata)
-
-
-def counters(evaluation: Evaluator) -> tuple[str, ...]:
-    """Return the columns of counters: those that follow `error_estimate`."""
-    columns = evaluation.row_columns
-    return columns[columns.index("error_estimate") + 1 :]
+    return schema((POINT, *evaluation.row_columns, REASON), COUNTERS, metadata)
 
 
 class RowStore:
     """The parts of a run, written block by block."""
 
-    def __init__(self, directory: RunDirectory, evaluation: Evaluator, table: pa.Schema) -> None:
+    def __init__(self, directory: RunDirectory, evaluation: Evaluation, table: pa.Schema) -> None:
         self._parts = Parts(directory.parts, table)
         self._evaluation = evaluation
         self.numbers: list[int] = []
@@ -86,7 +81,7 @@ class RowStore:
         names = list(self._evaluation.initial_conditions)
         n_rows = block.size * len(names)
         rows: dict[str, Array] = {name: np.full(n_rows, np.nan) for name in self._evaluation.row_columns}
-        rows |= {name: np.full(n_rows, None, dtype=object) for name in ("stable", *counters(self._evaluation))}
+        rows |= {name: np.full(n_rows, None, dtype=object) for name in ("stable", *COUNTERS)}
         rows |= {name: np.tile(values, len(names)) for name, values in block.design.items()}
         rows["initial_condition"] = np.repeat(np.array(names, dtype=object), block.size)
         rows["status"] = np.full(n_rows, FAILED, dtype=object)

@@ -7,14 +7,14 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+from fracctl.evaluation import Evaluation
 from fracctl.execution.row_store import RowStore
-from fracctl.execution.worker import Evaluator
-from fracctl.store.columns import REASON
+from fracctl.store.columns import POINT, REASON
 from fracctl.surveys.base import Rows
 
 Optimum = Mapping[str, Any]
 
-_ADDED_COLUMNS = ("kind", "slice", "objective_name", REASON)
+_ADDED_COLUMNS = ("kind", "slice", "objective_name", POINT, REASON)
 _NO_OPTIMUM_NEEDS = "needs status ok, a finite value and a loop that is not unstable"
 
 
@@ -45,7 +45,7 @@ class Tally:
         return f"of {counts.total()} points " + ", ".join(f"{count} {word}" for word, count in counts.most_common())
 
 
-def results(evaluation: Evaluator, optima: Iterable[Optimum]) -> list[dict[str, Any]]:
+def results(evaluation: Evaluation, optima: Iterable[Optimum]) -> list[dict[str, Any]]:
     """Return optimum, baseline and change for every objective, the primary one first, and initial condition."""
     rows = list(optima)
     names = sorted(evaluation.objectives, key=lambda name: name != evaluation.objective)

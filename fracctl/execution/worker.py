@@ -10,38 +10,13 @@ import traceback
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, Protocol, cast
+from typing import TYPE_CHECKING, Any
 
 from fracctl.arrays import Array, Floats
 from fracctl.errors import FracctlError
 
 if TYPE_CHECKING:
-    import pandas as pd
-
-
-class Evaluator(Protocol):
-    """What execution needs to know of `fracctl.evaluation.Evaluation`."""
-
-    @property
-    def design_variables(self) -> tuple[str, ...]: ...  # noqa: D102
-    @property
-    def row_columns(self) -> tuple[str, ...]: ...  # noqa: D102
-    @property
-    def initial_conditions(self) -> Mapping[str, Floats]: ...  # noqa: D102
-    @property
-    def objectives(self) -> Mapping[str, tuple[str, ...]]: ...  # noqa: D102
-    @property
-    def objective(self) -> str: ...  # noqa: D102
-    @property
-    def horizon(self) -> float: ...  # noqa: D102
-
-    def __call__(self, design: Mapping[str, Floats]) -> Mapping[str, Array]:
-        """Rows of all points, initial condition outermost."""
-        ...
-
-    def trajectories(self, rows: pd.DataFrame, times: Floats) -> Mapping[str, Array]:
-        """Trajectories of rows at the given times; `run` is the index of the row."""
-        ...
+    from fracctl.evaluation import Evaluation
 
 
 @dataclass(frozen=True)
@@ -58,15 +33,16 @@ class Work:
         """Return the work of `factory` with plain data."""
         return cls(factory, json.dumps(data, sort_keys=True))
 
-    def evaluation(self) -> Evaluator:
+    def evaluation(self) -> Evaluation:
         """Return the evaluation, built at the first call in this process."""
         return _build(self)
 
 
 @lru_cache(maxsize=4)
-def _build(work: Work) -> Evaluator:
+def _build(work: Work) -> Evaluation:
     module, _, name = work.factory.partition(":")
-    return cast(Evaluator, getattr(importlib.import_module(module), name)(json.loads(work.data)))
+    evaluation: Evaluation = getattr(importlib.import_module(module), name)(json.loads(work.data))
+    return evaluation
 
 
 @dataclass(frozen=True)
@@ -103,7 +79,7 @@ def describe(problem: BaseException) -> str:
     return f"{name}{problem}".splitlines()[0].strip().removesuffix(":")
 
 
-def _check(rows: Mapping[str, Array], evaluation: Evaluator, design: Mapping[str, Floats]) -> None:
+def _check(rows: Mapping[str, Array], evaluation: Evaluation, design: Mapping[str, Floats]) -> None:
     expected = len(next(iter(design.values()))) * len(evaluation.initial_conditions)
     wrong = [name for name in evaluation.row_columns if name not in rows or len(rows[name]) != expected]
     if wrong:

@@ -7,15 +7,16 @@ import signal
 import sys
 import time
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from fracctl.execution.computation import Job
 from fracctl.execution.worker import Work
+from fracctl.plants import LinearPlant
 from fracctl.store import identity
 from fracctl.surveys import Grid, Survey, axis_values
 
@@ -45,6 +46,8 @@ class FakeEvaluation:
     objectives = {"time": ("settling_time",), "joint": ("settling_time", "control_effort")}  # noqa: RUF012
     objective = "time"
     horizon = 10.0
+    plant = LinearPlant(-1.0, components=("w",))
+    measures = ()
 
     def __init__(self, data: Mapping[str, Any]) -> None:
         self.initial_conditions = {name: np.ones(2) for name in data.get("initial_conditions", ["one", "two"])}
@@ -95,13 +98,22 @@ class FakeEvaluation:
             "nodes": np.arange(size),
         }
 
-    def trajectories(self, rows: pd.DataFrame, times: np.ndarray) -> dict[str, np.ndarray]:
-        n_times = times.size
-        return {
-            "run": np.repeat(rows.index.to_numpy(), n_times),
-            "time": np.tile(times, len(rows)),
-            "w": np.concatenate([np.exp(-times / value) for value in rows["settling_time"]]),
-        }
+    def solve(
+        self, design: Mapping[str, float], initial_condition: str, horizon: float | None = None
+    ) -> FakeTrajectory:
+        return FakeTrajectory(design["alpha_w"])
+
+
+@dataclass(frozen=True)
+class FakeTrajectory:
+    rate: float
+
+    def __call__(self, times: np.ndarray) -> np.ndarray:
+        decay = np.exp(-self.rate * times)
+        return np.stack([decay, -self.rate * decay], axis=1)
+
+    def control(self, times: np.ndarray) -> np.ndarray:
+        return self(times)[:, 1:]
 
 
 def commit(fault: Mapping[str, Any]) -> None:

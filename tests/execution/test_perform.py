@@ -95,7 +95,8 @@ def test_optima_and_trajectories_belong_together(undisturbed: Path) -> None:
     assert sorted(trajectories["run"].unique()) == shown.index.tolist()
     last = trajectories[trajectories["run"] == best.name].iloc[-1]
     assert last["time"] == 10.0
-    assert last["w"] == pytest.approx(np.exp(-10.0 / best["settling_time"]))
+    assert last["w"] == pytest.approx(np.exp(-10.0 * best["alpha_w"]))
+    assert list(trajectories) == ["run", "time", "w", "w_dot", "control_w"]
 
 
 def test_the_summary_is_plain_and_stored(undisturbed: Path) -> None:
