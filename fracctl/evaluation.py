@@ -87,8 +87,8 @@ class Evaluation:
     def __call__(self, design: Mapping[str, Floats]) -> dict[str, Array]:
         """Return the rows of b design points: all points of the first initial condition, then of the next.
 
-        `status` is ``ok``, ``unsettled`` (no settling within the horizon, or a marginal loop), ``unstable``, ``diverged`` or
-        ``failed`` (certificate not met). Measures of trajectories that do not exist are +inf.
+        `status` is ``ok``, ``unsettled`` (no settling within the horizon, or a marginal loop), ``unstable``,
+        ``diverged`` or ``failed`` (certificate not met). Measures of trajectories that do not exist are +inf.
         """
         full = self._full_design(design)
         b, k = len(next(iter(full.values()))), len(self.initial_conditions)
@@ -116,7 +116,8 @@ class Evaluation:
         unknown = set(design) - set(defaults)
         if unknown:
             raise ArgumentError("design", sorted(unknown)[0], f"must name parameters of the law, {sorted(defaults)}")
-        arrays = {name: np.atleast_1d(np.asarray(design.get(name, value), float)) for name, value in defaults.items()}
+        given = {name: design.get(name, value) for name, value in defaults.items()}
+        arrays = {name: np.atleast_1d(np.asarray(value, dtype=np.float64)) for name, value in given.items()}
         return dict(zip(arrays, map(np.ascontiguousarray, np.broadcast_arrays(*arrays.values())), strict=True))
 
     def _measured(self, trajectory: Trajectory) -> dict[str, Array]:
@@ -134,7 +135,7 @@ class Evaluation:
         rows |= {f"objective_{name}": mean for name, mean in means.items()}
         status = trajectory.status.copy()
         unsettled = np.logical_or.reduce([~np.isfinite(column) for column in values.values()])
-        marginal = np.equal(trajectory.stable, None)
+        marginal = np.array([verdict is None for verdict in trajectory.stable], dtype=bool)
         status[(status == "ok") & (unsettled | marginal)] = "unsettled"
         rows |= {"status": status, "stable": trajectory.stable, "error_estimate": trajectory.error_estimate}
         return rows | {name: trajectory.counters[name] for name in COUNTERS}

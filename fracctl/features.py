@@ -102,7 +102,7 @@ def _late_excursions(
     close = np.flatnonzero((np.where(later, magnitude, 0.0).max(axis=1) > 0.4 * level) & np.isfinite(times))
     if not close.size:
         return times
-    local = Spots(*_extremum_spots(grid, magnitude[close], np.sign(values[close]) * slopes[close]))
+    local = _rising(grid, np.sign(values[close]) * slopes[close])
     local = local.take(np.flatnonzero(grid.time_at(local.panels, local.low) >= grid.times[last[close]][local.rows]))
     moved = Spots(close[local.rows], local.panels, local.low, local.high)
     peak = roots(grid, slopes, grid.slope(slopes), moved)
@@ -119,13 +119,12 @@ def _late_excursions(
     return times
 
 
-def _extremum_spots(grid: PanelGrid, values: Floats, slopes: Floats) -> tuple[Array, Array, Floats, Floats]:
-    """Return the intervals in which `values` rise at the left node and no longer at the right one."""
+def _rising(grid: PanelGrid, slopes: Floats) -> Spots:
+    """Return the intervals in which a function rises at the left node and no longer at the right one."""
     left = grid.left
     rising = slopes > 0.0
     rows, which = np.nonzero(rising[:, left] & ~rising[:, left + 1])
-    spots = intervals(grid, rows, left[which])
-    return spots.rows, spots.panels, spots.low, spots.high
+    return intervals(grid, rows, left[which])
 
 
 def largest_maximum(grid: PanelGrid, values: Floats, with_end: bool) -> Floats:
@@ -135,7 +134,7 @@ def largest_maximum(grid: PanelGrid, values: Floats, with_end: bool) -> Floats:
     """
     result = np.maximum(values[:, -1], 0.0) if with_end else np.zeros(len(values))
     slopes = grid.slope(values)
-    spots = Spots(*_extremum_spots(grid, values, slopes))
+    spots = _rising(grid, slopes)
     reach = _upper_bounds(grid, values, slopes, spots)
     best = np.zeros(len(values))
     nodes = np.maximum.reduce([result, _node_maxima(grid, values, spots, len(values))])
@@ -144,7 +143,8 @@ def largest_maximum(grid: PanelGrid, values: Floats, with_end: bool) -> Floats:
     if spots.rows.size:
         y = roots(grid, slopes, grid.slope(slopes), spots)
         np.maximum.at(best, spots.rows, grid.at(spots.rows, spots.panels, y, values)[0])
-    return np.maximum(result, best)
+    largest: Floats = np.maximum(result, best)
+    return largest
 
 
 def _node_maxima(grid: PanelGrid, values: Floats, spots: Spots, count: int) -> Floats:
@@ -184,19 +184,20 @@ def absolute_integral(grid: PanelGrid, values: Floats) -> Floats:
     rows, which = np.nonzero(positive[:, left] != positive[:, left + 1])
     single = intervals(grid, rows, left[which])
     total += _correction(grid, values, slopes, single, pieces[rows, which], len(values))
-    return total + _dips(grid, values, slopes, positive, pieces)
+    total += _dips(grid, values, slopes, positive, pieces)
+    integral: Floats = total
+    return integral
 
 
-def _correction(
-    grid: PanelGrid, values: Floats, slopes: Floats, spots: Spots, pieces: Floats, count: int
-) -> Floats:
+def _correction(grid: PanelGrid, values: Floats, slopes: Floats, spots: Spots, pieces: Floats, count: int) -> Floats:
     """Return |I₁| + |I₂| - |I₁ + I₂| summed over members, the spots divided at their sign change."""
     if not spots.rows.size:
         return np.zeros(count)
     y = roots(grid, values, slopes, spots)
     first = _integral(grid, values, spots, y)
     extra = np.abs(first) + np.abs(pieces - first) - np.abs(pieces)
-    return np.bincount(spots.rows, extra, minlength=count)
+    summed: Floats = np.bincount(spots.rows, extra, minlength=count).astype(np.float64)
+    return summed
 
 
 def _integral(grid: PanelGrid, values: Floats, spots: Spots, y: Floats) -> Floats:
@@ -235,4 +236,5 @@ def _dips(grid: PanelGrid, values: Floats, slopes: Floats, positive: Array, piec
     first = _integral(grid, values, before, down)
     last = whole - _integral(grid, values, spots, up)
     extra = np.abs(first) + np.abs(whole - first - last) + np.abs(last) - np.abs(whole)
-    return np.bincount(rows, extra, minlength=len(values))
+    summed: Floats = np.bincount(rows, extra, minlength=len(values)).astype(np.float64)
+    return summed

@@ -29,20 +29,27 @@ class Panel:
 
     def time(self, y: Floats) -> Floats:
         """Return time at y."""
+        times: Floats
         if self.logarithmic:
-            return self.start * (self.end / self.start) ** (0.5 * (y + 1.0))
-        return self.start + 0.5 * (self.end - self.start) * (y + 1.0)
+            times = self.start * (self.end / self.start) ** (0.5 * (y + 1.0))
+        else:
+            times = self.start + 0.5 * (self.end - self.start) * (y + 1.0)
+        return times
 
     def y(self, time: Floats) -> Floats:
         """Return y at times of this panel."""
+        y: Floats
         if self.logarithmic:
-            return 2.0 * np.log(time / self.start) / np.log(self.end / self.start) - 1.0
-        return 2.0 * (time - self.start) / (self.end - self.start) - 1.0
+            y = 2.0 * np.log(time / self.start) / np.log(self.end / self.start) - 1.0
+        else:
+            y = 2.0 * (time - self.start) / (self.end - self.start) - 1.0
+        return y
 
     def rate(self, y: Floats) -> Floats:
         """Return dt/dy at y."""
         if self.logarithmic:
-            return 0.5 * np.log(self.end / self.start) * self.time(y)
+            rate: Floats = 0.5 * np.log(self.end / self.start) * self.time(y)
+            return rate
         return np.full_like(y, 0.5 * (self.end - self.start))
 
 
@@ -65,7 +72,7 @@ class _Rule:
 def _rule(n: int) -> _Rule:
     k = np.arange(n)
     y = np.sin(0.5 * np.pi * (2.0 * k - (n - 1)) / (n - 1))
-    weights = (-1.0) ** k
+    weights = np.where(k % 2 == 0, 1.0, -1.0)
     weights[[0, -1]] *= 0.5
     gap = y[:, None] - y + np.eye(n)
     slope = (weights / weights[:, None]) / gap

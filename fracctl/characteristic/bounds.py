@@ -36,4 +36,5 @@ def _norm(matrix: CharacteristicMatrix, radius: Floats) -> Floats:
             if entry is not None:
                 magnitudes[i, k] = entry.magnitude(radius)
         magnitudes[i, i] -= 1.0
-    return np.minimum(magnitudes.sum(axis=1).max(axis=0), magnitudes.sum(axis=0).max(axis=0))
+    norm: Floats = np.minimum(magnitudes.sum(axis=1).max(axis=0), magnitudes.sum(axis=0).max(axis=0))
+    return norm

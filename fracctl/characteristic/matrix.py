@@ -64,8 +64,7 @@ class CharacteristicMatrix:
         self.batch = system.batch or 1
         self.highest = system.highest
         self.entries = [
-            [_entry(system.dynamics, i, k, float(self.highest[k])) for k in range(self.size)]
-            for i in range(self.size)
+            [_entry(system.dynamics, i, k, float(self.highest[k])) for k in range(self.size)] for i in range(self.size)
         ]
 
     def __call__(self, sigma: Complexes) -> list[list[Complexes | None]]:
@@ -91,7 +90,8 @@ def determinant(entries: list[list[Complexes | None]], shape: tuple[int, ...]) -
         return first
     if size == 2:
         (a, b), (c, d) = entries
-        assert a is not None and d is not None
+        assert a is not None
+        assert d is not None
         product = a * d
         return product if b is None or c is None else product - b * c
     values: Complexes = np.linalg.det(stack(entries, shape))

@@ -106,7 +106,9 @@ def _newton(matrix: CharacteristicMatrix, sigma: Complexes) -> Complexes:
     with np.errstate(all="ignore"):
         for _ in range(80):
             step = 1e-6 * np.abs(sigma)
-            value, ahead, behind = matrix.determinant(np.concatenate([sigma, sigma + step, sigma - step]))[0].reshape(3, -1)
+            value, ahead, behind = matrix.determinant(np.concatenate([sigma, sigma + step, sigma - step]))[0].reshape(
+                3, -1
+            )
             change = np.where(value == 0.0, 0.0, -value * 2.0 * step / (ahead - behind))
             change *= np.minimum(1.0, 0.5 * np.abs(sigma) / np.maximum(np.abs(change), 1e-300))
             sigma = sigma + change

@@ -92,7 +92,8 @@ def _turns(matrix: CharacteristicMatrix, path: Complexes) -> tuple[Floats, Boole
 def _between(left: Complexes, right: Complexes) -> Complexes:
     """Midpoint along the line or the arc that joins two neighbours of the path."""
     radius = np.sqrt(np.abs(left) * np.abs(right))
-    return radius * np.exp(0.5j * (np.angle(left) + np.angle(right)))
+    middle: Complexes = radius * np.exp(0.5j * (np.angle(left) + np.angle(right)))
+    return middle
 
 
 def crossings(values: Complexes) -> tuple[Floats, Booleans]:

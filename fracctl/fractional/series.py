@@ -16,7 +16,8 @@ from fracctl.arrays import Floats
 from fracctl.errors import UnsupportedError
 from fracctl.fractional.system import LinearFractionalSystem
 
-_SMALLEST_SHIFT = 0.05
+_MOST_LEVELS = 60
+"""Steps of the recursion after which the powers of a solution count as too dense."""
 _Key = tuple[int, tuple[tuple[int, int], ...]]
 """Start (0 for y(0), 1 for y'(0)) and how often each (term, column-row shift class) occurs."""
 
@@ -54,7 +55,8 @@ class PowerSeries:
         if basis.ndim == 2:
             total: Floats = values @ basis
             return total
-        return np.einsum("...be,bet->...bt", values, basis)
+        each: Floats = np.einsum("...be,bet->...bt", values, basis)
+        return each
 
 
 def _killed(exponent: Floats, order: float | Floats) -> bool:
@@ -69,14 +71,14 @@ def short_time_series(system: LinearFractionalSystem, y0: Floats, y0_rate: Float
     """Return the powers up to exponent `highest` of the solution with y(0), y'(0), each (…, b, p).
 
     Raises:
-        UnsupportedError: a term has an order within 0.05 of the highest of its row, so that powers lie too dense.
+        UnsupportedError: an order lies so near the highest of its equation that the powers are too dense.
     """
     symbols = _symbols(system)
     level: dict[_Key, Floats] = {(0, ()): np.moveaxis(y0, -1, 0), (1, ()): np.moveaxis(y0_rate, -1, 0)}
     exponents: list[Floats] = []
     coefficients: list[Floats] = []
     remainder, cut = np.zeros(y0.shape[:-1]), np.inf
-    while level:
+    for _ in range(_MOST_LEVELS):
         following: dict[_Key, Floats] = {}
         for key, value in level.items():
             e = _exponent(key, symbols)
@@ -90,6 +92,13 @@ def short_time_series(system: LinearFractionalSystem, y0: Floats, y0_rate: Float
                 if not _killed(e, symbol.order):
                     symbol.feed(value, following, _extended(key, number))
         level = following
+        if not level:
+            break
+    else:
+        raise UnsupportedError(
+            "an order of the loop lies too near the highest order of its equation, so that the powers of its"
+            " short-time solution are too dense; lower the order or drop the term"
+        )
     return PowerSeries(exponents, coefficients, remainder, cut)
 
 
@@ -117,11 +126,6 @@ def _symbols(system: LinearFractionalSystem) -> list[_Symbol]:
         for row, column in np.argwhere(term.matrix.reshape(-1, *term.matrix.shape[-2:]).any(axis=0)):
             order = term.orders[..., column]
             shift = highest[row] - order
-            if np.min(shift) < _SMALLEST_SHIFT:
-                raise UnsupportedError(
-                    f"a term of order {float(np.max(order)):g} lies within {_SMALLEST_SHIFT} of the highest order"
-                    f" {highest[row]:g} of its equation, too close for the powers of its short-time solution"
-                )
             same = [s for s in symbols if np.array_equal(s.shift, shift) and np.array_equal(s.order, order)]
             symbol = same[0] if same else _Symbol(shift, order, {})
             if not same:

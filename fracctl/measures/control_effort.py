@@ -22,7 +22,7 @@ class ControlEffort:
     def __call__(self, trajectory: Trajectory) -> dict[str, Floats]:
         """Return column ``control_effort``, (b,)."""
         controls = trajectory.controls_at_nodes
-        blank = np.isnan(controls).any(axis=(1, 2))
+        blank = np.isnan(controls.sum(axis=(1, 2)))
         clean = np.where(blank[:, None, None], 0.0, controls) if blank.any() else controls
         total = sum(absolute_integral(trajectory.grid, clean[:, i]) for i in range(controls.shape[1]))
         first = np.abs(clean[:, :, 0]).sum(axis=1) * trajectory.grid.panels[0].start

@@ -57,9 +57,7 @@ class Overshoot:
         return excursion
 
 
-def overshoot(
-    trajectory: Trajectory, definition: str = "past_equilibrium", scale: float = 1e4
-) -> Floats | float:
+def overshoot(trajectory: Trajectory, definition: str = "past_equilibrium", scale: float = 1e4) -> Floats | float:
     """Return the overshoot of each trajectory, (b,), or a number for a single one; see `Overshoot`."""
     value = Overshoot(definition, scale)(trajectory)["overshoot"]
     return value if trajectory.batched else float(value[0])

@@ -1,6 +1,6 @@
 """The contour solver: numerical inversion of the Laplace transform for whole batches of loops, with a certificate.
 
-Windows of time, each with a contour of its own (Weideman and Trefethen, Math. Comp. 76 (2007) 1341, gives the
+Windows of time, each with a contour of its own (Weideman and Trefethen, Math. Comp. 76 (2007) 1341, give the
 hyperbola that `contour_design` departs from), and for every member
 
 - the number of poles right of every contour, by the argument principle;
@@ -19,33 +19,47 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fracctl.arrays import Array, Booleans, Floats, finite
+from fracctl.arrays import Array, Floats, finite
 from fracctl.characteristic.bounds import pole_radius
 from fracctl.characteristic.matrix import CharacteristicMatrix
 from fracctl.characteristic.winding import abscissa_bound, unstable_zeros
 from fracctl.errors import ArgumentError
 from fracctl.fractional.system import LinearFractionalSystem
-from fracctl.fractional.terms import FractionalTerm
 from fracctl.loop import ClosedLoop
-from fracctl.panels import PanelGrid
 from fracctl.solvers.base import Survey
 from fracctl.solvers.contour_plan import make_plan
-from fracctl.solvers.contour_response import Response, respond
+from fracctl.solvers.contour_response import respond
+from fracctl.solvers.contour_results import Members, merged, packed, without_trajectory
 from fracctl.trajectory import Trajectory
 
-_FIRST_HULL = 1.0
-"""First guess of the largest imaginary part of poles, relative to the pole radius."""
 _CHUNK = 1024
 _LARGEST_GROWTH = 200.0
 """Exponent of growth over the horizon beyond which an unstable trajectory is given up as diverged."""
+_FEWEST_SHARED = 8
+"""Members with equal orders that are worth a group of their own."""
+_SMALLEST_TOLERANCE = 1e-12
+
+
+@dataclass(frozen=True)
+class _Attempt:
+    """How contours are laid out: wider and with a finer rule each time."""
+
+    width: float
+    """Height of the contours over the bound on the poles' imaginary parts."""
+    safety: float
+    """Tolerance of the rule over that of the solver."""
+    ratio: float
+    """Pole radii within this factor share a contour."""
+
+
+_ATTEMPTS = (_Attempt(1.0, 0.03, 1.25), _Attempt(1.1, 0.003, 1.5), _Attempt(1.5, 0.001, 1.5))
 
 
 @dataclass(frozen=True)
 class _Group:
-    """Members with the same orders and the same contours."""
+    """Members that share contours."""
 
     rows: Array
-    hull: float
     radius: float
     shift: float
 
@@ -86,81 +100,67 @@ class Contour:
 
         Raises:
             ArgumentError: a shape does not fit, or the horizon is not positive.
+            UnsupportedError: poles times horizon are too large, or orders too near the highest.
         """
         state = finite("initial_state", initial_state)
         y0, rate = loop.initial_values(state)
-        batch = max(loop.batch or 1, len(y0) if y0.ndim == 2 else 1)
-        system = _with_batch(loop.system, batch)
+        batch = _common_batch(loop.batch, len(state) if state.ndim == 2 else None)
+        system = replace(loop.system, batch=batch)
         y0, rate = (np.broadcast_to(v, (1, batch, v.shape[-1])) for v in (y0, rate))
-        parts = list(self._groups(system, y0, rate, _positive("horizon", horizon), every=True))
-        batched = loop.batch is not None or state.ndim == 2
-        return replace(_merged(parts, batch), batched=batched)
+        parts = list(self._groups(Members(system, y0, rate, _positive("horizon", horizon), every=True)))
+        return replace(merged(parts, batch), batched=loop.batch is not None or state.ndim == 2)
 
     def survey(self, loop: ClosedLoop, initial_states: ArrayLike, horizon: float) -> Iterator[Survey]:
         """Yield members group by group, each from all k initial states (k, n); unstable ones without trajectory."""
         y0, rate = loop.initial_values(np.atleast_2d(finite("initial_states", initial_states)))
-        system = _with_batch(loop.system, loop.batch or 1)
-        yield from self._groups(system, y0[:, None], rate[:, None], _positive("horizon", horizon), every=False)
+        system = replace(loop.system, batch=loop.batch or 1)
+        yield from self._groups(Members(system, y0[:, None], rate[:, None], _positive("horizon", horizon), every=False))
 
-    def _groups(
-        self, system: LinearFractionalSystem, y0: Floats, rate: Floats, horizon: float, every: bool
-    ) -> Iterator[Survey]:
-        for members in _equal_orders(system):
-            part = _shared_orders(system.take(members))
-            matrix = CharacteristicMatrix(part)
+    def _groups(self, everyone: Members) -> Iterator[Survey]:
+        """Split the members by orders, tell the unstable apart and solve the rest."""
+        for which in _equal_orders(everyone.system):
+            members = everyone.take(which)
+            matrix = CharacteristicMatrix(members.system)
             zeros, marginal = unstable_zeros(matrix)
-            stable = np.where(marginal, None, zeros == 0.0)
-            radius = pole_radius(matrix)
-            shift = np.zeros(len(members))
-            unstable = np.flatnonzero(~marginal & (zeros > 0.0))
-            if unstable.size and every:
-                bound = abscissa_bound(matrix.take(unstable), 1.0 / horizon)
-                shift[unstable] = np.ceil(bound * horizon) / horizon
-            given_up = shift * horizon > _LARGEST_GROWTH
-            if not every:
-                given_up[unstable] = True
+            stable = (zeros == 0.0).astype(object)
+            stable[marginal] = None
+            members = replace(members, stable=stable)
+            unstable = ~marginal & (zeros > 0.0)
+            shift = np.zeros(len(which))
+            if members.every and unstable.any():
+                shift[unstable] = _growth(matrix.take(np.flatnonzero(unstable)), members.horizon)
+            given_up = shift * members.horizon > _LARGEST_GROWTH if members.every else unstable
             if given_up.any():
-                rows = np.flatnonzero(given_up)
-                yield _without_trajectory(members[rows], stable[rows], y0, rate, system, horizon, every)
-            solve = np.flatnonzero(~given_up)
-            for survey in self._solved(part, solve, radius, shift, stable, y0, rate, members, horizon, every):
-                yield survey
+                yield without_trajectory(members.take(np.flatnonzero(given_up)))
+            yield from self._solved(members, np.flatnonzero(~given_up), pole_radius(matrix), shift)
 
-    def _solved(
-        self,
-        system: LinearFractionalSystem,
-        rows: Array,
-        radius: Floats,
-        shift: Floats,
-        stable: Array,
-        y0: Floats,
-        rate: Floats,
-        members: Array,
-        horizon: float,
-        with_rates: bool,
-    ) -> Iterator[Survey]:
-        """Solve `rows`, those that miss the tolerance again with a wider hull, the third time as they come out."""
-        cost = np.zeros(len(members), dtype=np.int64)
-        for attempt, (width, safety) in enumerate([(_FIRST_HULL, 0.03), (1.1, 0.003), (1.5, 0.001)]):
+    def _solved(self, members: Members, rows: Array, radius: Floats, shift: Floats) -> Iterator[Survey]:
+        """Solve `rows`; those that miss the tolerance again, the last time as they come out."""
+        cost = np.zeros(len(radius), dtype=np.int64)
+        for attempt in _ATTEMPTS:
             missed: list[Array] = []
-            for group in _hull_classes(rows, radius, shift, width, 1.5 if attempt else 1.25):
-                plan = make_plan(horizon, group.hull, group.radius, group.shift, max(safety * self.tolerance, 1e-12))
+            for group in _classes(rows, radius, shift, attempt.ratio):
+                tolerance = max(attempt.safety * self.tolerance, _SMALLEST_TOLERANCE)
+                plan = make_plan(members.horizon, attempt.width * group.radius, group.radius, group.shift, tolerance)
                 cost[group.rows] += plan.nodes
-                pick = members[group.rows] if y0.shape[1] > 1 else slice(None)
-                response = respond(system.take(group.rows), y0[:, pick], rate[:, pick], plan, with_rates)
+                part = members.take(group.rows)
+                response = respond(part.system, part.y0, part.rate, plan, part.every)
                 good = response.enclosed & (response.error.max(axis=0) <= self.tolerance)
-                done = good if attempt < 2 else np.ones_like(good)
-                if not done.all():
-                    missed.append(group.rows[~done])
+                done = good if attempt is not _ATTEMPTS[-1] else np.ones_like(good)
+                missed.append(group.rows[~done])
                 if done.any():
-                    chosen = np.flatnonzero(done)
-                    which = group.rows[chosen]
-                    yield _packed(
-                        response, chosen, members[which], stable[which], good[chosen], cost[which], plan.grid, y0[:, pick], rate[:, pick]
-                    )
-            if not missed:
+                    yield packed(part, response, np.flatnonzero(done), good, cost[group.rows], plan.grid)
+            rows = np.concatenate([np.zeros(0, dtype=np.intp), *missed])
+            if not rows.size:
                 return
-            rows = np.concatenate(missed)
+
+
+def _common_batch(loop: int | None, states: int | None) -> int:
+    sizes = {size for size in (loop, states) if size is not None and size != 1}
+    if len(sizes) > 1:
+        allowed = f"must have the batch size of the loop, {loop}"
+        raise ArgumentError("initial_state", f"a batch of {states}", allowed)
+    return sizes.pop() if sizes else 1
 
 
 def _positive(name: str, value: float) -> float:
@@ -170,154 +170,35 @@ def _positive(name: str, value: float) -> float:
     return number
 
 
-def _with_batch(system: LinearFractionalSystem, batch: int) -> LinearFractionalSystem:
-    return replace(system, batch=batch)
+def _growth(matrix: CharacteristicMatrix, horizon: float) -> Floats:
+    """Bound the real parts of the poles from above, rounded to whole multiples of 1/horizon."""
+    growth: Floats = np.ceil(abscissa_bound(matrix, 1.0 / horizon) * horizon) / horizon
+    return growth
 
 
 def _equal_orders(system: LinearFractionalSystem) -> Iterator[Array]:
-    """Yield groups of members: those that share all orders, or all together where too few would."""
-    own = [term.orders for term in system.dynamics if term.orders.ndim == 2]
+    """Yield groups of members: those that share all orders, or together where too few do."""
     batch = system.batch or 1
-    everyone = np.arange(batch)
+    own = [term.orders for term in system.dynamics if term.orders.ndim == 2]
     if not own:
-        yield everyone
+        yield np.arange(batch)
         return
     table = np.concatenate([np.broadcast_to(o, (batch, o.shape[-1])) for o in own], axis=1)
     _, which = np.unique(table, axis=0, return_inverse=True)
     which = which.ravel()
     counts = np.bincount(which)
-    together = counts[which] < 8
-    if together.any():
-        yield everyone[together]
-    for value in np.flatnonzero(counts >= 8):
-        yield everyone[which == value]
+    few = counts[which] < _FEWEST_SHARED
+    if few.any():
+        yield np.flatnonzero(few)
+    for value in np.flatnonzero(counts >= _FEWEST_SHARED):
+        yield np.flatnonzero(which == value)
 
 
-def _shared_orders(system: LinearFractionalSystem) -> LinearFractionalSystem:
-    """Drop the batch axis of orders that are equal in all members."""
-
-    def shared(term: FractionalTerm) -> FractionalTerm:
-        if term.orders.ndim == 2 and np.all(term.orders == term.orders[:1]):
-            return FractionalTerm(term.matrix, term.orders[0])
-        return term
-
-    return replace(
-        system, dynamics=tuple(map(shared, system.dynamics)), control=tuple(map(shared, system.control))
-    )
-
-
-def _hull_classes(rows: Array, radius: Floats, shift: Floats, width: float, ratio: float) -> Iterator[_Group]:
+def _classes(rows: Array, radius: Floats, shift: Floats, ratio: float) -> Iterator[_Group]:
     """Split rows by shift and by pole radius, rounded up to powers of `ratio`, into chunks."""
     level = np.ceil(np.log(radius[rows]) / np.log(ratio)).astype(int)
     for a in np.unique(shift[rows]):
         for k in np.unique(level[shift[rows] == a]):
             group = rows[(shift[rows] == a) & (level == k)]
-            bound = float(ratio**k)
             for start in range(0, len(group), _CHUNK):
-                yield _Group(group[start : start + _CHUNK], width * bound, bound, float(a))
-
-
-def _packed(
-    response: Response,
-    chosen: Array,
-    rows: Array,
-    stable: Array,
-    good: Booleans,
-    nodes: Array,
-    grid: PanelGrid,
-    y0: Floats,
-    rate: Floats,
-) -> Survey:
-    """Flatten (k, b) to k·b trajectories and name their status."""
-    k = len(y0)
-    everyone = len(chosen) == response.positions.shape[1]
-
-    def flat(values: Floats) -> Floats:
-        picked = values if everyone else values[:, chosen]
-        return picked.reshape(k * len(chosen), *values.shape[2:])
-
-    status = np.where(good, "ok", "failed").astype(object)
-    status[good & (stable == False)] = "unstable"  # noqa: E712 - entries are True, False or None
-    m = response.positions.shape[2]
-    start = np.concatenate([y0[..., :m], rate[..., :m], y0[..., m:]], axis=-1)
-    start = np.broadcast_to(start, (k, response.positions.shape[1], start.shape[-1]))
-    rates = response.rates if response.rates is not None else grid.derivative(response.positions)
-    trajectory = Trajectory(
-        grid=grid,
-        initial_state=flat(start),
-        positions=flat(response.positions),
-        controls_at_nodes=flat(response.controls),
-        initial_controls=flat(response.initial_controls),
-        rates=flat(rates),
-        auxiliary=flat(response.auxiliary),
-        status=np.tile(status, k),
-        stable=np.tile(stable, k),
-        error_estimate=flat(response.error),
-        counters={"nodes": np.tile(nodes, k)},
-    )
-    return Survey(rows, trajectory)
-
-
-def _without_trajectory(
-    rows: Array,
-    stable: Array,
-    y0: Floats,
-    rate: Floats,
-    system: LinearFractionalSystem,
-    horizon: float,
-    diverged: bool,
-) -> Survey:
-    """Return members proved unstable, with NaN for their trajectories."""
-    k, b, m = len(y0), len(rows), system.n_positions
-    grid = make_plan(horizon, 1.0, 1.0, 0.0, 1e-6).grid
-    start = np.concatenate([y0[..., :m], rate[..., :m], y0[..., m:]], axis=-1)
-    start = start[:, rows] if start.shape[1] > 1 else np.broadcast_to(start, (k, b, start.shape[-1]))
-    blank = np.full((k * b, m, len(grid.times)), np.nan)
-    trajectory = Trajectory(
-        grid=grid,
-        initial_state=start.reshape(k * b, -1),
-        positions=blank,
-        controls_at_nodes=blank,
-        initial_controls=blank[..., 0],
-        rates=blank,
-        auxiliary=np.full((k * b, system.n_auxiliary, len(grid.times)), np.nan),
-        status=np.full(k * b, "diverged" if diverged else "unstable", dtype=object),
-        stable=np.tile(stable, k),
-        error_estimate=np.full(k * b, np.nan),
-        counters={"nodes": np.zeros(k * b, dtype=np.int64)},
-    )
-    return Survey(rows, trajectory)
-
-
-def _merged(parts: list[Survey], batch: int) -> Trajectory:
-    """Bring all members to the grid with most nodes."""
-    if len(parts) == 1 and np.array_equal(parts[0].rows, np.arange(batch)):
-        return parts[0].trajectory
-    grid = max((part.trajectory.grid for part in parts), key=lambda g: len(g.times))
-    first = parts[0].trajectory
-
-    def gather(name: str, on_grid: bool) -> Array:
-        example = getattr(first, name)
-        out = np.empty((batch, *example.shape[1:-1], len(grid.times)) if on_grid else (batch, *example.shape[1:]), example.dtype)
-        for part in parts:
-            values = getattr(part.trajectory, name)
-            same = part.trajectory.grid is grid or not on_grid
-            out[part.rows] = values if same else part.trajectory.grid.evaluate(values, grid.times)
-        return out
-
-    nodes = np.empty(batch, dtype=np.int64)
-    for part in parts:
-        nodes[part.rows] = part.trajectory.counters["nodes"]
-    return Trajectory(
-        grid=grid,
-        initial_state=gather("initial_state", False),
-        positions=gather("positions", True),
-        controls_at_nodes=gather("controls_at_nodes", True),
-        initial_controls=gather("initial_controls", False),
-        rates=gather("rates", True),
-        auxiliary=gather("auxiliary", True),
-        status=gather("status", False),
-        stable=gather("stable", False),
-        error_estimate=gather("error_estimate", False),
-        counters={"nodes": nodes},
-    )
+                yield _Group(group[start : start + _CHUNK], float(ratio**k), float(a))

@@ -40,8 +40,10 @@ class ContourShape:
 
     def at(self, theta: Floats) -> tuple[Complexes, Complexes]:
         """Return σ - a and dσ/dθ, times t₁."""
-        sigma = self.vertex - self.bend * (np.cosh(theta) - 1.0) + 1j * self.speed * theta
-        return sigma, -self.bend * np.sinh(theta) + 1j * self.speed
+        sigma, slope = np.empty(theta.shape, dtype=np.complex128), np.empty(theta.shape, dtype=np.complex128)
+        sigma.real, sigma.imag = self.vertex - self.bend * (np.cosh(theta) - 1.0), self.speed * theta
+        slope.real, slope.imag = -self.bend * np.sinh(theta), self.speed
+        return sigma, slope
 
 
 @lru_cache(maxsize=512)
@@ -82,8 +84,8 @@ def design(tolerance: float, ratio: float, height: float) -> ContourShape:
             "shorten the horizon or lower the gains"
         )
     nodes = int(np.ceil(count[best]))
-    shape = (c[best[0], 0, 0, 0], nu[best[1], 0, 0], kappa[best], step[best])
-    return ContourShape(*(float(value) for value in shape), nodes)
+    vertex, bend = float(c[best[0], 0, 0, 0]), float(nu[best[1], 0, 0])
+    return ContourShape(vertex, bend, float(kappa[best]), float(step[best]), nodes)
 
 
 def _downward_step(c: Floats, nu: Floats, kappa: Floats, decades: float) -> Floats:

@@ -87,16 +87,18 @@ def _index(orders: list[_Derivative], wanted: _Derivative) -> int:
 
 
 def _peak(values: Floats, initial: Floats | None = None) -> Floats:
-    peak = np.abs(values).max(axis=(-2, -1))
+    peak: Floats = np.abs(values).max(axis=(-2, -1))
     return peak if initial is None else np.maximum(peak, np.abs(initial).max(axis=-1))
 
 
 def _largest(differences: Floats) -> Floats:
-    return differences.max(axis=(0, -1))
+    largest: Floats = differences.max(axis=(0, -1))
+    return largest
 
 
 def _relative(difference: Floats, tail: Floats, peak: Floats) -> Floats:
-    return np.divide(np.maximum(difference, tail), peak, out=np.zeros_like(peak), where=peak > 0.0)
+    error: Floats = np.divide(np.maximum(difference, tail), peak, out=np.zeros_like(peak), where=peak > 0.0)
+    return error
 
 
 def _controls(
@@ -120,7 +122,7 @@ def _controls(
 def _derivatives(
     system: LinearFractionalSystem, y0: Floats, y0_rate: Floats, plan: Plan, orders: list[_Derivative]
 ) -> tuple[Floats, Floats, Floats, Booleans]:
-    """Return all derivatives on the grid (w, k, b, T), differences (w, k, b, c), values at 0+ (w, k, b, 1), enclosure."""
+    """Return derivatives on the grid (w, k, b, T), differences (w, k, b, c), values at 0+ (w, k, b, 1), enclosure."""
     matrix = CharacteristicMatrix(system)
     k, b, _ = y0.shape
     values = np.empty((len(orders), k, b, len(plan.grid.times)))
@@ -149,7 +151,7 @@ def _start(
     values: Floats,
     differences: Floats,
 ) -> Floats:
-    """Fill the first panel from the power series, the first column of `differences` with its remainder; values at 0+."""
+    """Fill the first panel from the power series, and one column with its remainder; return values at 0+."""
     panel = plan.grid.panels[0]
     times = plan.grid.times[: panel.nodes]
     series = short_time_series(system, y0, y0_rate, SERIES_ORDER)

@@ -1,0 +1,150 @@
+"""From responses of groups to trajectories: status, flattening, and one grid for all."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from fracctl.arrays import Array, Booleans, Floats
+from fracctl.fractional.system import LinearFractionalSystem
+from fracctl.fractional.terms import FractionalTerm
+from fracctl.panels import PanelGrid
+from fracctl.solvers.base import Survey
+from fracctl.solvers.contour_plan import make_plan
+from fracctl.solvers.contour_response import Response
+from fracctl.trajectory import Trajectory
+
+
+@dataclass(frozen=True)
+class Members:
+    """Some members of a batch, what they start from and what is known of them."""
+
+    system: LinearFractionalSystem
+    y0: Floats
+    """y(0), (k, b, p) or (k, 1, p)."""
+    rate: Floats
+    """y'(0), as y0."""
+    horizon: float
+    every: bool
+    """Whether unstable members want a trajectory and all members rates."""
+    rows: Array = field(default_factory=lambda: np.zeros(0, dtype=np.intp))
+    """Numbers of the members in the whole batch, (b,)."""
+    stable: Array = field(default_factory=lambda: np.zeros(0, dtype=object))
+    """Verdicts, (b,), once known."""
+
+    def take(self, which: Array) -> Members:
+        """Return some of the members; orders they share lose their batch axis."""
+        return replace(
+            self,
+            system=_with_shared_orders(self.system.take(which)),
+            y0=self.y0[:, which] if self.y0.shape[1] > 1 else self.y0,
+            rate=self.rate[:, which] if self.rate.shape[1] > 1 else self.rate,
+            rows=self.rows[which] if self.rows.size else which,
+            stable=self.stable[which] if self.stable.size else self.stable,
+        )
+
+    def initial_states(self) -> Floats:
+        """Return [ξ(0), ξ'(0), z(0)], (k, b, n)."""
+        m = self.system.n_positions
+        start = np.concatenate([self.y0[..., :m], self.rate[..., :m], self.y0[..., m:]], axis=-1)
+        return np.broadcast_to(start, (len(start), len(self.rows), start.shape[-1]))
+
+
+def _with_shared_orders(system: LinearFractionalSystem) -> LinearFractionalSystem:
+    def shared(term: FractionalTerm) -> FractionalTerm:
+        equal = term.orders.ndim == 2 and np.all(term.orders == term.orders[:1])
+        return FractionalTerm(term.matrix, term.orders[0]) if equal else term
+
+    dynamics, control = (tuple(shared(term) for term in terms) for terms in (system.dynamics, system.control))
+    return replace(system, dynamics=dynamics, control=control)
+
+
+def packed(
+    members: Members, response: Response, chosen: Array, good: Booleans, nodes: Array, grid: PanelGrid
+) -> Survey:
+    """Return the `chosen` of the members with their status, k·r trajectories."""
+    k, count = response.positions.shape[:2]
+    everyone = len(chosen) == count
+
+    def flat(values: Floats) -> Floats:
+        picked = values if everyone else values[:, chosen]
+        return picked.reshape(k * len(chosen), *values.shape[2:])
+
+    stable = members.stable[chosen]
+    status = np.where(good[chosen], "ok", "failed").astype(object)
+    status[good[chosen] & np.array([verdict is False for verdict in stable], dtype=bool)] = "unstable"
+    rates = response.rates if response.rates is not None else grid.derivative(response.positions)
+    trajectory = Trajectory(
+        grid=grid,
+        initial_state=flat(members.initial_states()),
+        positions=flat(response.positions),
+        controls_at_nodes=flat(response.controls),
+        initial_controls=flat(response.initial_controls),
+        rates=flat(rates),
+        auxiliary=flat(response.auxiliary),
+        status=np.tile(status, k),
+        stable=np.tile(stable, k),
+        error_estimate=flat(response.error),
+        counters={"nodes": np.tile(nodes[chosen], k)},
+    )
+    return Survey(members.rows[chosen], trajectory)
+
+
+def without_trajectory(members: Members) -> Survey:
+    """Return members proved unstable, with NaN for their trajectories."""
+    start = members.initial_states()
+    k, b, _ = start.shape
+    m, q = members.system.n_positions, members.system.n_auxiliary
+    grid = make_plan(members.horizon, 1.0, 1.0, 0.0, 1e-6).grid
+    blank = np.full((k * b, m, len(grid.times)), np.nan)
+    trajectory = Trajectory(
+        grid=grid,
+        initial_state=start.reshape(k * b, -1),
+        positions=blank,
+        controls_at_nodes=blank,
+        initial_controls=blank[..., 0],
+        rates=blank,
+        auxiliary=np.full((k * b, q, len(grid.times)), np.nan),
+        status=np.full(k * b, "diverged" if members.every else "unstable", dtype=object),
+        stable=np.tile(members.stable, k),
+        error_estimate=np.full(k * b, np.nan),
+        counters={"nodes": np.zeros(k * b, dtype=np.int64)},
+    )
+    return Survey(members.rows, trajectory)
+
+
+def merged(parts: list[Survey], batch: int) -> Trajectory:
+    """Bring all members to the grid with most nodes."""
+    first = parts[0].trajectory
+    if len(parts) == 1 and np.array_equal(parts[0].rows, np.arange(batch)):
+        return first
+    grid = max((part.trajectory.grid for part in parts), key=lambda g: len(g.times))
+    order = np.concatenate([part.rows for part in parts])
+    place = np.argsort(order, kind="stable")
+
+    def joined(name: str) -> Array:
+        return np.concatenate([getattr(part.trajectory, name) for part in parts])[place]
+
+    def regridded(name: str) -> Floats:
+        values = [
+            getattr(t, name) if t.grid is grid else t.grid.evaluate(getattr(t, name), grid.times)
+            for t in (part.trajectory for part in parts)
+        ]
+        out: Floats = np.concatenate(values)[place]
+        return out
+
+    return replace(
+        first,
+        grid=grid,
+        positions=regridded("positions"),
+        controls_at_nodes=regridded("controls_at_nodes"),
+        rates=regridded("rates"),
+        auxiliary=regridded("auxiliary"),
+        initial_state=joined("initial_state"),
+        initial_controls=joined("initial_controls"),
+        status=joined("status"),
+        stable=joined("stable"),
+        error_estimate=joined("error_estimate"),
+        counters={"nodes": np.concatenate([part.trajectory.counters["nodes"] for part in parts])[place]},
+    )
