@@ -84,8 +84,8 @@ def design(tolerance: float, ratio: float, height: float) -> ContourShape:
             "shorten the horizon or lower the gains"
         )
     nodes = int(np.ceil(count[best]))
-    vertex, bend = float(c[best[0], 0, 0, 0]), float(nu[best[1], 0, 0])
-    return ContourShape(vertex, bend, float(kappa[best]), float(step[best]), nodes)
+    vertex = float(c[best[0], 0, 0, 0])
+    return ContourShape(vertex, float(nu[best[1], 0, 0]), float(kappa[best]), float(step[best]), nodes)
 
 
 def _downward_step(c: Floats, nu: Floats, kappa: Floats, decades: float) -> Floats:
