@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import ast
 import re
 import subprocess
+import sys
 import tomllib
 import zipfile
+from importlib.metadata import packages_distributions
 from pathlib import Path
 
 import pytest
@@ -82,6 +85,19 @@ def test_wheel_declares_what_the_project_declares(wheel: zipfile.ZipFile) -> Non
     assert "fracctl = fracctl.cli.main:main" in "".join(
         wheel.read(name).decode() for name in wheel.namelist() if name.endswith("entry_points.txt")
     )
+
+
+def test_everything_imported_is_a_declared_dependency() -> None:
+    trees = [ast.parse(path.read_text(encoding="utf-8")) for path in (ROOT / "fracctl").rglob("*.py")]
+    nodes = [node for tree in trees for node in ast.walk(tree)]
+    dotted = {alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names}
+    dotted |= {str(node.module) for node in nodes if isinstance(node, ast.ImportFrom)}
+    imported = {name.split(".")[0] for name in dotted} - sys.stdlib_module_names - {"fracctl"}
+    extras = [names for extra, names in PROJECT["optional-dependencies"].items() if extra == "dask"]
+    declared = {re.split(r"[<>=]", name)[0] for names in [PROJECT["dependencies"], *extras] for name in names}
+    distributions = packages_distributions()
+    offered = {name: {name.lower(), *map(str.lower, distributions.get(name, []))} for name in imported}
+    assert {name for name in imported if not declared & offered[name]} <= {"pydantic_core"}, "pydantic's other half"
 
 
 def test_changelog_follows_its_form() -> None:
