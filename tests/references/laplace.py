@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -108,6 +108,13 @@ def window_of(time: float) -> int:
     return math.ceil(math.log(time, WINDOW) - 1e-12)
 
 
+def _by_window(times: Floats) -> Iterator[tuple[int | None, NDArray[np.intp]]]:
+    """Yield each window and the places of its times; None for the time 0."""
+    windows = [window_of(t) if t > 0 else None for t in times]
+    for window in set(windows):
+        yield window, np.flatnonzero([w == window for w in windows])
+
+
 @dataclass(frozen=True)
 class Values:
     """A trajectory at some times; every array is (t, m)."""
@@ -178,12 +185,10 @@ class Reference:
         """Return the values in double precision, to about 1e-13 of the peak; fast for many times ≥ 0."""
         times = np.asarray(times, float).ravel()
         table = np.empty((times.size, 4 * self.loop.size))
-        indices = np.array([window_of(t) if t > 0 else -99 for t in times])
         pole, residue = np.array(self.poles, complex), np.array(self.residues, complex)
-        for window in set(indices.tolist()):
-            rows = np.flatnonzero(indices == window)
-            if window == -99:
-                table[rows] = self._initial()
+        for window, rows in _by_window(times):
+            if window is None:
+                table[rows] = _initial(self.loop)
                 continue
             with mpmath.workdps(self.digits + GUARD):
                 values = np.array([[complex(v) for v in row] for row in self._weighted(window, 15)])
@@ -192,32 +197,41 @@ class Reference:
             table[rows] += (np.exp(np.outer(times[rows], pole)) @ residue).real
         return Values(*np.split(table, 4, axis=1))
 
-    def _initial(self) -> Floats:
-        control = -self.loop.k_p @ self.loop.value
-        control -= self.loop.k_d @ np.where(self.loop.alpha == 1.0, self.loop.rate, 0.0)
-        return np.concatenate([self.loop.value, self.loop.rate, control, np.zeros(self.loop.size)])
+
+def _initial(loop: Loop) -> Floats:
+    """Return ξ, ξ', υ, ∫υ at s = 0, where the Caputo derivative is 0 for orders below 1."""
+    control = -loop.k_p @ loop.value - loop.k_d @ np.where(loop.alpha == 1.0, loop.rate, 0.0)
+    return np.concatenate([loop.value, loop.rate, control, np.zeros(loop.size)])
 
 
-def quick(loop: Loop, times: ArrayLike) -> tuple[Values, NDArray[np.complex128]]:
-    """Return values and poles in double precision throughout: about 1e-11 of the peak at simple poles, milliseconds.
+class QuickReference:
+    """The same in double precision throughout: about 1e-11 of the peak at simple poles, within milliseconds.
 
     For tests over many loops; checked against `Reference` in tests/references/test_references.py.
     """
-    times = np.asarray(times, float).ravel()
-    known = poles.poles(loop)
-    log_known = np.log(known)
-    residue = np.array(
-        [residues(loop, p, [np.exp(a * z) for a in loop.alpha]) for p, z in zip(known, log_known, strict=True)]
-    )
-    table = (np.exp(np.outer(times, known)) @ residue).real
-    indices = np.array([window_of(t) for t in times])
-    for window in set(indices.tolist()):
-        rows = np.flatnonzero(indices == window)
-        nodes = contour(window, 14)
-        sigma, log_sigma, weight = (
-            np.array([complex(x) for x in part]) for part in (nodes.sigma, nodes.log_sigma, nodes.weights)
-        )
-        smooth = np.array(transforms(loop, sigma, [np.exp(a * log_sigma) for a in loop.alpha])).T
-        smooth = smooth - (1.0 / (sigma[:, None] - known)) @ residue
-        table[rows] += (np.exp(np.outer(times[rows], sigma)) @ (weight[:, None] * smooth)).imag
-    return Values(*np.split(table, 4, axis=1)), known
+
+    def __init__(self, loop: Loop) -> None:
+        self.loop, self.poles = loop, poles.poles(loop)
+        pairs = zip(self.poles, np.log(self.poles), strict=True)
+        self.residues = np.array([residues(loop, p, [np.exp(a * z) for a in loop.alpha]) for p, z in pairs])
+
+    def __call__(self, times: ArrayLike) -> Values:
+        """Return the values at times ≥ 0."""
+        times = np.asarray(times, float).ravel()
+        table = (np.exp(np.outer(times, self.poles)) @ self.residues).real
+        for window, rows in _by_window(times):
+            if window is None:
+                table[rows] = _initial(self.loop)
+                continue
+            sigma, log_sigma, weights = _double_contour(window)
+            powers = [np.exp(a * log_sigma) for a in self.loop.alpha]
+            smooth = np.array(transforms(self.loop, sigma, powers)).T
+            smooth = smooth - (1.0 / (sigma[:, None] - self.poles)) @ self.residues
+            table[rows] += (np.exp(np.outer(times[rows], sigma)) @ (weights[:, None] * smooth)).imag
+        return Values(*np.split(table, 4, axis=1))
+
+
+@functools.lru_cache(maxsize=64)
+def _double_contour(window: int) -> tuple[NDArray[np.complex128], ...]:
+    nodes = contour(window, 14)
+    return tuple(np.array([complex(x) for x in part]) for part in (nodes.sigma, nodes.log_sigma, nodes.weights))

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from tests.references.laplace import Reference
+from tests.references.laplace import QuickReference, Reference
 
 Floats = NDArray[np.float64]
 
@@ -39,7 +39,7 @@ def roots(function: Callable[[Floats], Floats], grid: Floats) -> Floats:
 class ReferenceMeasures:
     """Measures of one reference trajectory on [0, horizon]."""
 
-    def __init__(self, reference: Reference, horizon: float) -> None:
+    def __init__(self, reference: Reference | QuickReference, horizon: float) -> None:
         self.reference, self.horizon = reference, horizon
         self.grid = scan_grid(horizon)
         self.values = reference(self.grid)

@@ -24,7 +24,7 @@ from tests.references.loops import Floats, Loop
 
 Complexes = NDArray[np.complex128]
 NEAR_ZERO = -45.0
-"""log of the radius below which det M equals det M(0) in double precision."""
+"""log of σ^α below which det M equals det M(0) in double precision."""
 
 
 def matrix_entries(loop: Loop, sigma: Any, powers: list[Any]) -> list[list[Any]]:
@@ -139,9 +139,9 @@ def argument_change(loop: Loop, path: Callable[[Floats], Complexes]) -> float:
 
 
 def _zeros_inside(loop: Loop, angle: float) -> int:
-    log_bound = np.log(pole_bound(loop))
+    log_bound, log_zero = np.log(pole_bound(loop)), NEAR_ZERO / float(loop.alpha.min())
     arc = argument_change(loop, lambda p: log_bound + 1j * angle * p)
-    ray = argument_change(loop, lambda p: log_bound + (NEAR_ZERO - log_bound) * p + 1j * angle)
+    ray = argument_change(loop, lambda p: log_bound + (log_zero - log_bound) * p + 1j * angle)
     count = (arc + ray) / np.pi
     if abs(count - round(count)) > 1e-6:
         raise ArithmeticError(f"arg det M changes by {count} π: det M vanishes near 0")
@@ -165,12 +165,14 @@ def companion(loop: Loop) -> NDArray[np.float64]:
     return np.vstack([top, np.hstack([loop.stiffness - loop.k_p, loop.damping - loop.k_d])])
 
 
-def _newton(loop: Loop) -> Complexes:
+def _newton(loop: Loop, starts: int) -> Complexes:
     """Return the zeros of det M(e^z) with 0 ≤ Im z < π that Newton's method finds from a lattice of starts."""
-    real, imaginary = np.meshgrid(np.linspace(-14.0, np.log(pole_bound(loop)), 48), np.linspace(0.0, np.pi, 20))
+    real, imaginary = np.meshgrid(
+        np.linspace(-14.0, np.log(pole_bound(loop)), 2 * starts), np.linspace(0, np.pi, starts)
+    )
     z = (real + 1j * imaginary).ravel()
     with np.errstate(all="ignore"):
-        for _ in range(60):
+        for _ in range(50):
             sigma, powers = np.exp(z), [np.exp(a * z) for a in loop.alpha]
             step = determinant(matrix_entries(loop, sigma, powers))
             step = step / (sigma * determinant_slope(loop, sigma, powers))
@@ -193,12 +195,14 @@ def poles(loop: Loop) -> Complexes:
     """
     if is_integer_order(loop):
         return np.linalg.eigvals(companion(loop)).astype(np.complex128)
-    upper = _newton(loop)
-    real = np.abs(upper.imag) < 1e-7 * np.abs(upper)
-    found = np.concatenate([upper[real].real + 0j, upper[~real], upper[~real].conj()])
-    if len(found) != sheet_count(loop):
-        raise ArithmeticError(f"{sheet_count(loop)} poles by the argument principle, {len(found)} by Newton's method")
-    return found
+    count = sheet_count(loop)
+    for starts in (8, 16, 32, 64):
+        upper = _newton(loop, starts)
+        real = np.abs(upper.imag) < 1e-7 * np.abs(upper)
+        found = np.concatenate([upper[real].real + 0j, upper[~real], upper[~real].conj()])
+        if len(found) == count:
+            return found
+    raise ArithmeticError(f"{count} poles by the argument principle, {len(found)} by Newton's method")
 
 
 def polished_poles(loop: Loop) -> list[Any]:

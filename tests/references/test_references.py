@@ -10,7 +10,7 @@ import pytest
 from scipy.integrate import quad
 
 from tests.references import loops, poles, series
-from tests.references.laplace import Reference, quick, transforms
+from tests.references.laplace import QuickReference, Reference, transforms
 from tests.references.measures import ReferenceMeasures, roots
 
 PAPER_GAINS = [[4.0, -1.35, 2.4, 0.65], [3.15, 0.4, 0.7, 1.95]]
@@ -110,7 +110,7 @@ def test_free_motion_is_the_matrix_exponential() -> None:
 def test_double_precision_references_keep_eleven_digits(loop: loops.Loop) -> None:
     times = [1e-4, 0.03, 1.0, 7.0, 12.0, 37.0]
     reference = Reference(loop, 20)
-    exact, fast, (quickest, _) = reference.digits_at(times), reference(times), quick(loop, times)
+    exact, fast, quickest = reference.digits_at(times), reference(times), QuickReference(loop)(times)
     for name in ("position", "rate", "control", "impulse"):
         values = getattr(exact, name)
         peak = np.abs(values).max()

@@ -1,0 +1,110 @@
+"""Verdicts and principal-sheet poles against reference poles, eigenvalues and cases decided by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fracctl import stability
+from fracctl.controllers import PDAlpha
+from fracctl.errors import ArgumentError
+from fracctl.loop import ClosedLoop
+from fracctl.plants import HCW, HCWInPlane, HCWOutOfPlane, LinearPlant
+from tests.references import loops, poles
+from tests.references.loops import Loop
+
+
+def single(member: Loop) -> ClosedLoop:
+    if member.size == 1:
+        return ClosedLoop(HCWOutOfPlane(), PDAlpha(member.k_p[0, 0], member.k_d[0, 0], member.alpha[0]))
+    return ClosedLoop(HCWInPlane(), PDAlpha(member.k_p, member.k_d, member.alpha))
+
+
+def same_set(first: np.ndarray, second: np.ndarray, tolerance: float) -> bool:
+    """Whether two sets of poles pair up."""
+    if len(first) != len(second):
+        return False
+    left = list(second)
+    for p in first:
+        distances = [abs(p - q) for q in left]
+        if min(distances) > tolerance * max(1.0, abs(p)):
+            return False
+        left.pop(int(np.argmin(distances)))
+    return True
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_poles_and_verdict_of_random_loops(seed: int) -> None:
+    kinds = [
+        lambda: next(loops.random_out_of_plane(40 + seed, 1)),
+        lambda: next(loops.random_in_plane(40 + seed, 1)),
+        lambda: next(loops.random_in_plane(40 + seed, 1, spread=2.0)),
+    ]
+    for kind in kinds:
+        member = kind()
+        verdict = stability.assess(single(member))
+        expected = poles.poles(member)
+        assert same_set(verdict.poles, expected, 1e-7), f"{verdict.poles} {expected}"
+        assert verdict.stable is bool(np.all(expected.real < 0))
+        assert verdict.certificate
+        assert verdict.method
+        assert np.all(np.diff(verdict.poles.real) <= 1e-9)
+
+
+def test_poles_at_integer_orders_are_eigenvalues() -> None:
+    for member in loops.random_in_plane(60, 10):
+        verdict = stability.assess(single(member.replace(alpha=[1.0, 1.0])))
+        expected = np.linalg.eigvals(poles.companion(member))
+        assert same_set(verdict.poles, expected, 1e-9)
+        assert verdict.stable is bool(np.all(expected.real < 0))
+
+
+def test_number_of_poles_jumps_at_order_one() -> None:
+    """w'' + 3 D^α w + w = 0 has two real poles at α = 1; below, they leave the principal sheet or pair up."""
+    assert len(stability.assess(ClosedLoop(HCWOutOfPlane(), PDAlpha(0.0, 3.0, 1.0))).poles) == 2
+    member = loops.out_of_plane(0.0, 3.0, 0.95, [1.0, 0.0])
+    assert len(stability.assess(single(member)).poles) == poles.sheet_count(member)
+
+
+@pytest.mark.parametrize("alpha", [1.0, 0.9, 0.4])
+@pytest.mark.parametrize("plant", [HCW(), HCWInPlane(), HCWOutOfPlane()])
+def test_free_motion_is_marginal(plant: LinearPlant, alpha: float) -> None:
+    m = plant.n_controls
+    nothing = np.zeros((m, m)) if m > 1 else 0.0
+    assert stability.assess(ClosedLoop(plant, PDAlpha(nothing, nothing, alpha))).stable is None
+
+
+@pytest.mark.parametrize(
+    ("k_p", "k_d", "expected"),
+    [
+        (0.5, 0.0, None),
+        (-1.0, 0.0, None),
+        (-1.0, 1.0, None),
+        (-1.5, 0.0, False),
+        (-1.5, 2.0, False),
+        (0.5, 1e-9, True),
+        (0.5, -1e-9, False),
+        (0.5, 1e-6, True),
+        (-1.0 + 1e-9, 1.0, True),
+        (-1.0 - 1e-9, 1.0, False),
+    ],
+)
+@pytest.mark.parametrize("alpha", [1.0, 0.8])
+def test_verdicts_that_follow_by_hand(k_p: float, k_d: float, expected: bool | None, alpha: float) -> None:
+    """σ² + k_D σ^α + 1 + k_P: marginal for k_D = 0 or a zero at σ = 0, else decided by the signs."""
+    assert stability.assess(ClosedLoop(HCWOutOfPlane(), PDAlpha(k_p, k_d, alpha))).stable is expected
+
+
+@pytest.mark.parametrize("k_d", [1e-2, -1e-2, 1e-4, -1e-4, 1e-7, -1e-7])
+@pytest.mark.parametrize("split", [0.0, 1e-4, 1e-2])
+def test_two_weakly_damped_pairs_close_together(k_d: float, split: float) -> None:
+    """Both pairs cross, or neither: a path that steps over 2π of phase would count 0 or 2 instead of 4 or 0."""
+    loop = ClosedLoop(
+        LinearPlant(np.diag([-1.0, -1.0 - split])), PDAlpha(np.zeros((2, 2)), k_d * np.eye(2), [0.9, 0.9])
+    )
+    assert stability.assess(loop).stable is (k_d > 0)
+
+
+def test_a_batch_is_refused_with_a_sentence() -> None:
+    with pytest.raises(ArgumentError, match="`loop` must be a single loop"):
+        stability.assess(ClosedLoop(HCWOutOfPlane(), PDAlpha([1.0, 2.0], 1.0)))
