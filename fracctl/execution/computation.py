@@ -122,6 +122,8 @@ class Computation:
         executor = make_executor(self._scheduler, self._survey.n_points)
         in_flight = 2 * self._workers if self._workers > 1 else 1
         scheduler = Scheduler(self._survey, executor, self._job.work, store, in_flight, self._progress.advance)
+        versions = self._record.provenance["versions"]
+        _log.info("fracctl %s, %s, workers: %d", versions["fracctl"], self._scheduler["type"], self._workers)
         n_points, n_conditions = self._survey.n_points, len(self._evaluation.initial_conditions)
         self._progress.start(None if n_points is None else n_points * n_conditions)
         try:

@@ -15,7 +15,7 @@ from fracctl.surveys.base import Rows
 Optimum = Mapping[str, Any]
 
 _ADDED_COLUMNS = ("kind", "slice", "objective_name", POINT, REASON)
-_NO_OPTIMUM_NEEDS = "needs status ok, a finite value and a loop that is not unstable"
+_OPTIMUM_NEEDS = "an optimum has status ok, a finite value, and some control effort if that is part of it"
 
 
 class Tally:
@@ -40,9 +40,9 @@ class Tally:
         return sum(counts.total() for counts in self._counts.values())
 
     def sentence(self, initial_condition: str) -> str:
-        """Return e.g. ``of 3 points 2 unsettled, 1 unstable``."""
+        """Return e.g. ``2 unsettled, 1 unstable``."""
         counts = self._counts.get(initial_condition, Counter())
-        return f"of {counts.total()} points " + ", ".join(f"{count} {word}" for word, count in counts.most_common())
+        return ", ".join(f"{count} {word}" for word, count in counts.most_common())
 
 
 def results(evaluation: Evaluation, optima: Iterable[Optimum]) -> list[dict[str, Any]]:
@@ -90,7 +90,7 @@ def notes_on(found: Sequence[Mapping[str, Any]], baseline: Mapping[str, float], 
         where = f"{result['objective_name']} for {result['initial_condition']}"
         if result["optimum"] is None:
             counts = tally.sentence(result["initial_condition"])
-            notes.append(f"no optimum of {where}: {counts}; an optimum {_NO_OPTIMUM_NEEDS}")
+            notes.append(f"no optimum of {where} (points: {counts}); {_OPTIMUM_NEEDS}")
         elif baseline and result["baseline"] is None:
             values = ", ".join(f"{name} = {value:g}" for name, value in baseline.items())
             notes.append(f"no baseline of {where}: no point with {values} can be an optimum")

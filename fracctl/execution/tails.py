@@ -23,60 +23,64 @@ GROWTH = 1e-3
 
 
 def notes_on_tails(evaluation: Evaluation, found: Iterable[Mapping[str, Any]]) -> list[str]:
-    """Return sentences on the optima of the primary objective, and on those that minimise control effort.
+    """Return sentences on the primary objective's optima, and on those of objectives that hold the control effort.
 
     Args:
-        evaluation: solves them again over twice the horizon.
+        evaluation: solves the optima again over twice the horizon.
         found: results by objective and initial condition, with their `optimum`.
     """
-    notes: dict[str, None] = {}
+    with_effort = [name for name, columns in evaluation.objectives.items() if "control_effort" in columns]
+    notes = []
     for result in found:
-        optimum, name = result["optimum"], result["objective_name"]
-        if optimum is None or not (name == evaluation.objective or "control_effort" in evaluation.objectives[name]):
+        name, condition, optimum = result["objective_name"], result["initial_condition"], result["optimum"]
+        looks_at_effort = name in (with_effort or [evaluation.objective])
+        if optimum is None or not (looks_at_effort or name == evaluation.objective):
             continue
-        condition = result["initial_condition"]
         design = {variable: float(optimum[variable]) for variable in evaluation.design_variables}
         trajectory = evaluation.solve(design, condition, 2.0 * evaluation.horizon)
-        notes |= dict.fromkeys(f"{condition}: {text}" for text in _sentences(evaluation, optimum, trajectory))
-    return list(notes)
+        sentences = list(_growth(evaluation, optimum, trajectory)) if looks_at_effort else []
+        if name == evaluation.objective:
+            sentences += _tighter_band(evaluation, optimum, trajectory)
+        notes += [f"{condition}, {name}: {sentence}" for sentence in sentences]
+    return notes
 
 
-def _sentences(evaluation: Evaluation, optimum: Mapping[str, Any], trajectory: Trajectory) -> Iterator[str]:
+def _growth(evaluation: Evaluation, optimum: Mapping[str, Any], trajectory: Trajectory) -> Iterator[str]:
     measures: tuple[Any, ...] = evaluation.measures
-    for measure in measures:
-        if isinstance(measure, ControlEffort):
-            yield from _growth(evaluation, float(optimum["control_effort"]), trajectory)
-        elif isinstance(measure, SettlingTime):
-            yield from _tighter_band(evaluation, measure, float(optimum["settling_time"]), trajectory)
-
-
-def _growth(evaluation: Evaluation, effort: float, trajectory: Trajectory) -> Iterator[str]:
-    (longer,) = ControlEffort()(trajectory)["control_effort"]
-    growth = float(longer) - effort
+    if not any(isinstance(measure, ControlEffort) for measure in measures):
+        return
+    effort = float(optimum["control_effort"])
+    growth = float(ControlEffort()(trajectory)["control_effort"][0]) - effort
     if growth > GROWTH * effort:
-        first, last = (_turns(evaluation, time) for time in (evaluation.horizon, 2.0 * evaluation.horizon))
-        share = 100.0 * growth / effort
+        first, last = _turns(evaluation.horizon), _turns(2.0 * evaluation.horizon)
         yield (
-            f"the control effort {effort:.5g} grows by {growth:.2g} ({share:.1f} %) from {first} to {last}: "
-            "its tail does not integrate, so compare it at one horizon only"
+            f"the control effort {effort:.5g} grows by {growth:.2g} ({100.0 * growth / effort:.1f} %) from {first} "
+            f"to {last} {_turn_name(evaluation)}, for its tail does not integrate: compare it at one horizon only"
         )
 
 
-def _tighter_band(
-    evaluation: Evaluation, measure: SettlingTime, settling_time: float, trajectory: Trajectory
-) -> Iterator[str]:
-    threshold = TIGHTER * measure.threshold
-    (tighter,) = SettlingTime(threshold)(trajectory)["settling_time"]
-    if tighter > LATER * settling_time:
-        band, given = (_length(evaluation, value) for value in (threshold, measure.threshold))
-        when = f"after {_turns(evaluation, float(tighter))}" if math.isfinite(tighter) else "not"
-        limit = f" within {_turns(evaluation, 2.0 * evaluation.horizon)}" if math.isinf(tighter) else ""
-        yield f"settles to {given} after {_turns(evaluation, settling_time)}, but to {band} {when}{limit}"
+def _tighter_band(evaluation: Evaluation, optimum: Mapping[str, Any], trajectory: Trajectory) -> Iterator[str]:
+    measures: tuple[Any, ...] = evaluation.measures
+    threshold = next((measure.threshold for measure in measures if isinstance(measure, SettlingTime)), None)
+    if threshold is None:
+        return
+    settled = float(optimum["settling_time"])
+    tighter = float(SettlingTime(TIGHTER * threshold)(trajectory)["settling_time"][0])
+    if tighter > LATER * settled:
+        turns = _turn_name(evaluation)
+        late = f"only after {_turns(tighter)}" if math.isfinite(tighter) else f"not in {_turns(trajectory.horizon)}"
+        yield (
+            f"settles to {_length(evaluation, threshold)} after {_turns(settled)} {turns}, "
+            f"but to {_length(evaluation, TIGHTER * threshold)} {late}"
+        )
 
 
-def _turns(evaluation: Evaluation, time: float) -> str:
-    unit = "periods" if evaluation.plant.scales is None else "orbits"
-    return f"{time / (2.0 * math.pi):.3g} {unit}"
+def _turns(time: float) -> str:
+    return f"{time / (2.0 * math.pi):.3g}"
+
+
+def _turn_name(evaluation: Evaluation) -> str:
+    return "periods" if evaluation.plant.scales is None else "orbits"
 
 
 def _length(evaluation: Evaluation, value: float) -> str:

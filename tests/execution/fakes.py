@@ -98,9 +98,7 @@ class FakeEvaluation:
             "nodes": np.arange(size),
         }
 
-    def solve(
-        self, design: Mapping[str, float], initial_condition: str, horizon: float | None = None
-    ) -> FakeTrajectory:
+    def solve(self, design: Mapping[str, float], initial_condition: str, horizon: float = 10.0) -> FakeTrajectory:
         return FakeTrajectory(design["alpha_w"])
 
 
