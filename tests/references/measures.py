@@ -23,7 +23,7 @@ from tests.references.laplace import QuickReference, Reference
 Floats = NDArray[np.float64]
 
 
-def scan_grid(horizon: float, count: int = 4000) -> Floats:
+def scan_grid(horizon: float, count: int = 2000) -> Floats:
     """Return times graded from 1e-9 up, then uniform up to `horizon`."""
     return np.unique(np.concatenate([np.geomspace(1e-9, 0.05, 200), np.linspace(0.05, horizon, count)]))
 

@@ -78,8 +78,8 @@ def test_random_gains_and_orders(random_members: list[Loop], horizon: float) -> 
 
 
 def test_random_gains_that_share_their_orders() -> None:
-    members = [m.replace(alpha=[0.93, 0.71]) for m in loops.random_in_plane(8, 150)]
-    members += [m.replace(alpha=[0.93, 0.71]) for m in loops.random_in_plane(9, 50, spread=2.5)]
+    members = [m.replace(alpha=[0.93, 0.71]) for m in loops.random_in_plane(8, 80)]
+    members += [m.replace(alpha=[0.93, 0.71]) for m in loops.random_in_plane(9, 40, spread=2.5)]
     trajectory = Contour().solve(
         ClosedLoop(
             HCWInPlane(),
