@@ -43,6 +43,11 @@ def number(value: Any, digits: int = 6) -> str:
     return f"{value:.{digits}g}"
 
 
+def count(how_many: int, what: str) -> str:
+    """``1 point``, ``2 points``."""
+    return f"{how_many} {what}" + ("" if how_many == 1 else "s")
+
+
 def _title(name: str | None, factors: Sequence[str]) -> str:
     if name is None or len(factors) < 2:
         return str(name or "result")
@@ -51,7 +56,7 @@ def _title(name: str | None, factors: Sequence[str]) -> str:
 
 def _rows(result: Mapping[str, Any], name: str | None, factors: Sequence[str], first: bool) -> Iterator[list[str]]:
     optimum, baseline, change = result["optimum"], result["baseline"], result["change_percent"]
-    condition = str(result.get("initial_condition") or "")
+    condition = str(result.get("initial_condition") or (optimum or {}).get("initial_condition") or "")
     if optimum is None:
         yield [condition, "no optimum"]
         return
@@ -63,7 +68,7 @@ def _rows(result: Mapping[str, Any], name: str | None, factors: Sequence[str], f
             shown = [cell for column in columns for cell in _cells(column, values.get(column))]
             yield [condition if label == "optimum" else "", label, *shown]
     if change is not None:
-        yield ["", "change", f"{change:+.1f} %".replace("-", "−")]
+        yield ["", "change", f"{change:+.1f} %"]
 
 
 def _columns(row: Mapping[str, Any]) -> list[str]:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from fracctl.cli import output
 from fracctl.cli.parser import Parser
+from fracctl.cli.table import count
 from fracctl.errors import RunError
 
 SUMMARY = "check a configuration, or the files of a stored run, without computing"
@@ -39,10 +40,9 @@ def execute(options: argparse.Namespace) -> int:
 
     config = compose(words, options.config_dir)
     evaluation, survey = build_checked(config)
-    conditions = len(evaluation.initial_conditions)
-    points = "points as the survey decides" if survey.n_points is None else f"{survey.n_points} design points"
-    for_each = "1 initial condition" if conditions == 1 else f"{conditions} initial conditions"
-    output.say(f"valid: {config.name}, {points}, {for_each}")
+    points = "points as the survey decides" if survey.n_points is None else count(survey.n_points, "design point")
+    conditions = count(len(evaluation.initial_conditions), "initial condition")
+    output.say(f"valid: {config.name}, {points}, {conditions}")
     return 0
 
 

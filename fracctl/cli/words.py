@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from fracctl.cli.table import number, table
+from fracctl.cli.table import count, number, table
 from fracctl.config.schemas import GridSurvey, RunConfig
 from fracctl.evaluation import Evaluation
 from fracctl.plants import Chief, LinearPlant
@@ -90,8 +90,8 @@ def _objectives(config: RunConfig) -> Iterator[_Row]:
 def _survey(config: RunConfig, evaluation: Evaluation, survey: Survey) -> Iterator[_Row]:
     conditions = len(evaluation.initial_conditions)
     points = survey.n_points
-    many = "as many design points as it needs" if points is None else _count(points, "design point")
-    yield "survey", f"{config.survey.type}: {many}, {_count(conditions, 'initial condition')}"
+    many = "as many design points as it needs" if points is None else count(points, "design point")
+    yield "survey", f"{config.survey.type}: {many}, {count(conditions, 'initial condition')}"
     if not isinstance(config.survey, GridSurvey):
         return
     for name, spec in config.survey.axes.items():
@@ -102,10 +102,6 @@ def _survey(config: RunConfig, evaluation: Evaluation, survey: Survey) -> Iterat
     if survey.baseline:
         wanted = ", ".join(f"{name} = {number(value)}" for name, value in survey.baseline.items())
         yield "", f"compared with the best point of {wanted}"
-
-
-def _count(number_of: int, what: str) -> str:
-    return f"{number_of} {what}" + ("" if number_of == 1 else "s")
 
 
 def _scheduler(config: RunConfig) -> str:

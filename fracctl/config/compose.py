@@ -158,7 +158,8 @@ def _parse(text: str, loader: ConfigLoader, found: Catalogue) -> Override:
         hint = suggestion(text, found.options("experiment")).replace("'", "'experiment=", 1)
         raise UsageError(f"'{text}' is not an override; write KEY=VALUE{hint}")
     try:
-        parsed = OverridesParser.create(config_loader=loader).parse_override(text)
+        parsed = OverridesParser.create().parse_override(text)
+        parsed.config_loader = loader  # for glob(…)
         sweep = _sweep(parsed)
         value = None if sweep is not None else parsed.value()
     except UsageError:

@@ -79,7 +79,9 @@ def shown(value: Any) -> str:
     names: dict[Any, str] = {None: "null", True: "true", False: "false"}
     if value is None or isinstance(value, bool):
         return names[value]
-    if isinstance(value, list):
+    if isinstance(value, float):
+        text = f"{value:.12g}"
+    elif isinstance(value, list):
         text = f"[{', '.join(shown(entry) for entry in value)}]"
     else:
         text = "{…}" if isinstance(value, Mapping) else str(value) or "''"

@@ -1,0 +1,110 @@
+"""`fracctl list`, `show` and `validate`."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from fracctl.cli.main import main
+from fracctl.store import RunDirectory
+
+
+def lines(capsys: pytest.CaptureFixture[str], *words: str) -> list[str]:
+    assert main(words) == 0
+    captured = capsys.readouterr()
+    assert captured.err == ""
+    return captured.out.splitlines()
+
+
+def test_list_names_experiments_and_groups(capsys: pytest.CaptureFixture[str]) -> None:
+    text = "\n".join(lines(capsys, "list"))
+    assert "ic1_outofplane" in text
+    assert "  solver             contour" in text
+
+
+@pytest.mark.parametrize("word", ["experiments", "experiment"])
+def test_list_experiments(capsys: pytest.CaptureFixture[str], word: str) -> None:
+    found = lines(capsys, "list", word)
+    assert [line.split()[0] for line in found] == ["ic1_outofplane", "ic2_outofplane", "ic3_outofplane", "outofplane"]
+    assert "Fastest settling out of plane from IC1" in found[0]
+
+
+def test_list_shows_files_of_ones_own(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    (tmp_path / "experiment" / "campaign").mkdir(parents=True)
+    (tmp_path / "experiment" / "campaign" / "one.yaml").write_text("# fracctl run experiment=campaign/one\n# First.\n")
+    found = lines(capsys, "list", "experiments", "--config-dir", str(tmp_path))
+    assert found[0].split() == ["campaign/one", "First."]
+    assert lines(capsys, "validate", "experiment=campaign/one", "--config-dir", str(tmp_path))
+
+
+def test_list_runs(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["list", "runs"]) == 0
+    assert capsys.readouterr().err == "no runs below 'outputs'\n"
+    for name, started, content in (
+        ("b", "2026-01-02", {"status": "finished", "summary": {"optimum": {"objective": 3.0127612}}}),
+        ("a", "2026-01-01", {"status": "running", "summary": None}),
+    ):
+        (tmp_path / "work" / name / "0123").mkdir(parents=True)
+        content |= {"configuration": {"objective": "settling_time"}, "provenance": {"started": started}}
+        (tmp_path / "work" / name / "0123" / "run.json").write_text(json.dumps(content))
+    (tmp_path / "work" / "a" / "broken").mkdir()
+    (tmp_path / "work" / "a" / "broken" / "run.json").write_text("{")
+    found = [line.split() for line in lines(capsys, "list", "runs", "output_dir=work")]
+    assert found[1:] == [
+        ["2026-01-01", "running", "work/a/0123"],
+        ["2026-01-02", "finished", "settling_time", "3.01276", "work/b/0123"],
+    ]
+
+
+def test_show_speaks_in_units(capsys: pytest.CaptureFixture[str]) -> None:
+    text = "\n".join(lines(capsys, "show", "experiment=outofplane"))
+    for part in (
+        "one period T = 2π = 2.76445 h",
+        "w_dot = 0.002 (12.627 m/s)",
+        "threshold 1e-05 (100 m)",
+        "35301 design points, 3 initial conditions",
+        "alpha_w from 0.8 to 1, 21 values",
+        "compared with the best point of alpha_w = 1",
+        "st_os_u = (settling_time · overshoot · control_effort)^(1/3)",
+        "υ = -K_P ξ - K_D D^α ξ",
+    ):
+        assert part in text
+
+
+def test_show_without_units(capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["plant=linear", "controller=pd_alpha_own", "initial_condition=own", "initial_condition.own.x=1"]
+    text = "\n".join(lines(capsys, "show", *words))
+    assert "dimensionless; T = 2π" in text
+    assert "own: x = 1" in text
+
+
+def test_show_names_the_directory_that_a_run_would_have(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    found = lines(capsys, "show", f"output_dir={tmp_path}")
+    assert found[-1].split()[-1].startswith(f"{tmp_path}/custom/")
+
+
+def test_validate_a_configuration(capsys: pytest.CaptureFixture[str]) -> None:
+    assert lines(capsys, "validate") == ["valid: custom, 1 design point, 1 initial condition"]
+
+
+def test_validate_a_run(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    run = RunDirectory(tmp_path / "run")
+    run.create()
+    assert main(["validate", str(run.path)]) == 1
+    assert "holds no run" in capsys.readouterr().err
+    run.write_run_json({"status": "running"})
+    assert main(["validate", str(run.path)]) == 1
+    assert "is not finished (status running)" in capsys.readouterr().err
+    run.write_run_json({"status": "finished"})
+    run.write_manifest()
+    assert lines(capsys, "validate", str(run.path)) == [
+        f"valid: {run.path} is finished, and every file is as it was written"
+    ]
+    (run.path / "run.json").write_text('{"status": "finished"}')
+    assert main(["validate", str(run.path)]) == 1
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert "run.json" in captured.err

@@ -1,0 +1,217 @@
+"""`fracctl run`: what it prints, in which order things happen, and what failures do. The computation is a stand-in."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from fracctl.cli.main import main
+from fracctl.config.schemas import RunConfig
+from fracctl.errors import RunError
+
+POINT = {"initial_condition": "ic1", "alpha_w": 0.91, "k_p_w": 0.85, "k_d_w": 2.0, "settling_time": 3.01276,
+         "overshoot": 7.7874, "control_effort": 2.638e-3, "objective": 3.01276, "objective_settling_time": 3.01276,
+         "objective_st_os_u": 0.395, "status": "ok", "stable": True, "error_estimate": 1e-9, "nodes": 40}  # fmt: skip
+BASELINE = POINT | {"alpha_w": 1.0, "k_p_w": 0.55, "settling_time": 3.96958}
+
+
+@dataclass
+class Result:
+    summary: dict[str, Any]
+
+
+@dataclass
+class StandIn:
+    """Stands in for `execute`: notes what it is called with, and answers or fails as it is told."""
+
+    calls: list[RunConfig] = field(default_factory=list)
+    options: list[dict[str, Any]] = field(default_factory=list)
+    fails: Callable[[RunConfig], Exception | None] = lambda config: None
+    further: dict[str, Any] = field(default_factory=dict)
+
+    def __call__(self, config: RunConfig, **options: Any) -> Result:
+        self.calls.append(config)
+        self.options.append(options)
+        if error := self.fails(config):
+            raise error
+        return Result(summary(config.name) | self.further)
+
+
+def summary(name: str) -> dict[str, Any]:
+    return {
+        "experiment": name, "run_id": "0123456789ab", "run_directory": f"/runs/{name}/0123456789ab",
+        "status": "finished", "reused": False, "optimum": POINT, "baseline": BASELINE, "change_percent": -24.1,
+        "error": None,
+    }  # fmt: skip
+
+
+@pytest.fixture
+def stand_in(monkeypatch: pytest.MonkeyPatch) -> StandIn:
+    found = StandIn()
+    monkeypatch.setattr("fracctl.execution.run.execute", found)
+    return found
+
+
+@pytest.mark.usefixtures("stand_in")
+def test_a_table_and_the_directory_as_the_last_line(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["run", "experiment=ic1_outofplane"]) == 0
+    captured = capsys.readouterr()
+    assert captured.err == ""
+    lines = captured.out.splitlines()
+    assert lines[-1] == "/runs/ic1_outofplane/0123456789ab"
+    assert lines[0] == "ic1_outofplane"
+    assert lines[2].split() == ["alpha_w", "k_p_w", "k_d_w", "settling_time", "overshoot", "control_effort"]
+    assert lines[3].split() == ["ic1", "optimum", "0.91", "0.85", "2", "3.01276", "0.4795", "T", "7.7874", "0.002638"]
+    assert "0.6318 T" in lines[4]
+    assert lines[5].split() == ["change", "-24.1", "%"]
+    columns = [line.index("7.7874") for line in lines[3:5]]
+    assert columns == [lines[2].index("overshoot")] * 2
+
+
+def test_several_objectives_and_initial_conditions(capsys: pytest.CaptureFixture[str], stand_in: StandIn) -> None:
+    stand_in.further["optima"] = [
+        {"initial_condition": ic, "objective_name": name, "optimum": optimum, "baseline": None, "change_percent": None}
+        for name in ("settling_time", "st_os_u")
+        for ic, optimum in (("ic1", POINT), ("ic2", None))
+    ]
+    assert main(["run"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[1] == "settling_time"
+    assert lines[4].split() == ["ic2", "no", "optimum"]
+    assert lines[5] == "st_os_u = (settling_time · overshoot · control_effort)^(1/3)"
+    assert lines[7].split()[-1] == "0.395"
+
+
+def test_notes_follow_the_table(capsys: pytest.CaptureFixture[str], stand_in: StandIn) -> None:
+    stand_in.further["notes"] = ["U depends on the horizon"]
+    assert main(["run"]) == 0
+    assert capsys.readouterr().out.splitlines()[-2] == "note: U depends on the horizon"
+    assert main(["run", "--quiet"]) == 0
+    assert "note" not in capsys.readouterr().out
+
+
+def test_a_stored_run_is_called_so(capsys: pytest.CaptureFixture[str], stand_in: StandIn) -> None:
+    stand_in.further["reused"] = True
+    assert main(["run", "--fresh"]) == 0
+    assert capsys.readouterr().out.startswith("custom, stored already\n")
+    assert stand_in.options[0]["fresh"] is True
+
+
+def test_json_is_a_line_a_run_and_nothing_else(capsys: pytest.CaptureFixture[str], stand_in: StandIn) -> None:
+    stand_in.further["baseline"] = BASELINE | {"settling_time": math.inf, "overshoot": math.nan}
+    assert main(["run", "-m", "experiment=ic1_outofplane,ic2_outofplane,ic3_outofplane", "--json"]) == 0
+    captured = capsys.readouterr()
+    assert captured.err == ""
+    runs = [json.loads(line) for line in captured.out.splitlines()]
+    assert [run["experiment"] for run in runs] == [f"ic{i}_outofplane" for i in (1, 2, 3)]
+    keys = [
+        "experiment",
+        "run_id",
+        "run_directory",
+        "status",
+        "reused",
+        "optimum",
+        "baseline",
+        "change_percent",
+        "error",
+    ]
+    assert list(runs[0]) == keys
+    assert runs[0]["baseline"]["settling_time"] is None
+    assert runs[0]["baseline"]["overshoot"] is None
+
+
+def test_all_runs_are_composed_before_the_first_starts(capsys: pytest.CaptureFixture[str], stand_in: StandIn) -> None:
+    assert main(["run", "-m", "controller.alpha_w=0.9,1.2,1.3"]) == 3
+    captured = capsys.readouterr()
+    assert stand_in.calls == []
+    assert captured.out == ""
+    assert captured.err.splitlines() == [
+        "error: run 2 of 3 (controller.alpha_w=1.2): controller.alpha_w = 1.2: must lie in (0, 1]",
+        "error: run 3 of 3 (controller.alpha_w=1.3): controller.alpha_w = 1.3: must lie in (0, 1]",
+    ]
+
+
+def test_an_error_of_all_runs_is_told_once(capsys: pytest.CaptureFixture[str], stand_in: StandIn) -> None:
+    assert main(["run", "-m", "controller.alpha_w=0.9,0.95", "controller.foo=1"]) == 3
+    assert capsys.readouterr().err == "error: unknown key 'controller.foo'; allowed: type, alpha_w, k_p_w, k_d_w\n"
+
+
+def fails_at(order: float) -> Callable[[RunConfig], Exception | None]:
+    return lambda config: RunError("the disk is full") if config.controller.model_dump()["alpha_w"] == order else None
+
+
+def test_other_runs_go_on_after_a_failure(capsys: pytest.CaptureFixture[str], stand_in: StandIn) -> None:
+    stand_in.fails = fails_at(0.9)
+    assert main(["run", "-m", "controller.alpha_w=0.8,0.9,1.0"]) == 1
+    captured = capsys.readouterr()
+    assert len(stand_in.calls) == 3
+    assert captured.out.count("/runs/custom") == 2
+    assert captured.err == "error: run 2 of 3 (controller.alpha_w=0.9): the disk is full\n"
+
+
+def test_fail_fast_stops(capsys: pytest.CaptureFixture[str], stand_in: StandIn) -> None:
+    stand_in.fails = fails_at(0.8)
+    assert main(["run", "-m", "controller.alpha_w=0.8,0.9,1.0", "--fail-fast"]) == 1
+    assert len(stand_in.calls) == 1
+
+
+def test_a_failed_run_has_its_line_of_json(capsys: pytest.CaptureFixture[str], stand_in: StandIn) -> None:
+    stand_in.fails = fails_at(0.9)
+    assert main(["run", "controller.alpha_w=0.9", "--json"]) == 1
+    captured = capsys.readouterr()
+    (line,) = captured.out.splitlines()
+    assert json.loads(line) == dict.fromkeys(summary("")) | {
+        "experiment": "custom", "status": "failed", "reused": False, "error": "the disk is full"
+    }  # fmt: skip
+    assert captured.err == "error: the disk is full\n"
+
+
+def test_an_incomplete_run_shows_what_it_has_and_fails(capsys: pytest.CaptureFixture[str], stand_in: StandIn) -> None:
+    stand_in.further = {"status": "incomplete", "error": "3 points could not be computed"}
+    assert main(["run"]) == 1
+    captured = capsys.readouterr()
+    assert captured.out.splitlines()[-1] == "/runs/custom/0123456789ab"
+    assert captured.err == "error: 3 points could not be computed\n"
+
+
+def test_an_interruption_ends_the_sweep(capsys: pytest.CaptureFixture[str], stand_in: StandIn) -> None:
+    def interrupt(config: RunConfig) -> None:
+        raise KeyboardInterrupt
+
+    stand_in.fails = interrupt
+    assert main(["run", "-m", "controller.alpha_w=0.8,0.9"]) == 130
+    assert len(stand_in.calls) == 1
+
+
+def test_cfg_job_prints_the_configuration_only(capsys: pytest.CaptureFixture[str], stand_in: StandIn) -> None:
+    assert main(["run", "experiment=outofplane", "--cfg", "job"]) == 0
+    out = capsys.readouterr().out
+    assert "name: outofplane\n" in out
+    assert "    alpha_w: 0.80:1.00:0.01\n" in out or "    alpha_w: '0.80:1.00:0.01'\n" in out
+    assert stand_in.calls == []
+
+
+def test_a_printed_configuration_is_an_experiment(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, stand_in: StandIn
+) -> None:
+    assert main(["run", "experiment=outofplane", "--cfg=job"]) == 0
+    printed = capsys.readouterr().out
+    (tmp_path / "experiment").mkdir()
+    (tmp_path / "experiment" / "copy.yaml").write_text(printed)
+    words = ["plant=hcw_out_of_plane", "initial_condition=[]", "measures=standard", "figures=null"]
+    assert main(["run", "experiment=copy", "--config-dir", str(tmp_path), "--cfg=job", *words]) == 0
+    assert capsys.readouterr().out == printed
+
+
+def test_sweeping_configurations_are_printed_one_after_the_other(
+    capsys: pytest.CaptureFixture[str], stand_in: StandIn
+) -> None:
+    assert main(["run", "-m", "seed=1,2", "--cfg=job"]) == 0
+    first, second = capsys.readouterr().out.split("---\n")
+    assert first.replace("seed: 1", "seed: 2") == second

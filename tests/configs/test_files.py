@@ -1,0 +1,89 @@
+"""Every YAML file of the repository: it says what it is, and it composes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from fracctl.config.build import build_checked
+from fracctl.config.catalogue import built_in_directory, catalogue
+from fracctl.config.compose import compose
+from fracctl.config.yaml_traps import traps
+from fracctl.execution.run import execute
+
+CONF = built_in_directory()
+FILES = sorted(CONF.rglob("*.yaml"))
+EXPERIMENTS = catalogue().options("experiment")
+GROUPS = (
+    "plant",
+    "controller",
+    "initial_condition",
+    "solver",
+    "measures",
+    "survey",
+    "scheduler",
+    "figures",
+    "experiment",
+)
+
+COMPANIONS = {
+    "plant=hcw": ["controller=pd_alpha_full"],
+    "plant=hcw_in_plane": ["controller=pd_alpha_in_plane"],
+    "plant=linear": ["controller=pd_alpha_own", "initial_condition=own", "initial_condition.own.x=1"],
+    "controller=pd_in_plane": ["plant=hcw_in_plane"],
+    "controller=pd_alpha_in_plane": ["plant=hcw_in_plane"],
+    "controller=pd_alpha_full": ["plant=hcw"],
+    "initial_condition=own": ["initial_condition.own.w=1e-3"],
+    "figures=paper_2_to_5": ["initial_condition=[ic1,ic2,ic3]", "survey=out_of_plane"],
+}
+"""What an option needs beside it."""
+
+OPTIONS = [f"{group}={option}" for group in catalogue().groups() for option in catalogue().options(group)]
+
+TINY = [
+    "survey.axes.alpha_w=[0.9,1.0]",
+    "survey.axes.k_p_w=[0.6,1.0]",
+    "survey.axes.k_d_w=[1.5,2.0]",
+    "scheduler=serial",
+]
+
+
+def test_the_groups() -> None:
+    assert set(catalogue().groups()) == set(GROUPS)
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(CONF)))
+def test_a_file_starts_with_what_it_is(path: Path) -> None:
+    lines = path.read_text(encoding="utf-8").splitlines()
+    assert lines[0].startswith("# ")
+    assert traps(path) == []
+    if path.parent.name == "experiment":
+        assert lines[0] == f"# fracctl run experiment={path.stem}"
+        assert lines[1].startswith("# ")
+
+
+@pytest.mark.parametrize("word", OPTIONS)
+def test_an_option_composes(word: str) -> None:
+    build_checked(compose([word, *COMPANIONS.get(word, [])]))
+
+
+@pytest.mark.parametrize("name", EXPERIMENTS)
+def test_an_experiment_bears_its_name(name: str) -> None:
+    assert compose([f"experiment={name}"]).name == name
+
+
+@pytest.mark.parametrize("name", EXPERIMENTS)
+def test_an_experiment_runs_on_a_tiny_budget(name: str, tmp_path: Path) -> None:
+    config = compose([f"experiment={name}", *TINY, f"output_dir={tmp_path}"])
+    result = execute(config)
+    assert result.summary["status"] == "finished"
+    assert len(result.evaluations) == 8 * len(config.initial_condition)
+    assert {path.stem for path in (result.run_directory / "figures").glob("*.pdf")} == set(config.figures)
+
+
+def test_the_papers_grid() -> None:
+    config = compose(["experiment=outofplane"])
+    evaluation, survey = build_checked(config)
+    assert survey.n_points == 21 * 41 * 41
+    assert list(evaluation.initial_conditions) == ["ic1", "ic2", "ic3"]
