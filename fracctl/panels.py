@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import lru_cache
 
 import numpy as np
 
@@ -62,8 +62,8 @@ class _Rule:
     """Barycentric weights, (n,)."""
     slope: Floats
     """d/dy at the nodes, (n, n), to be applied from the right."""
-    pieces: Floats
-    """Integrals between neighbouring nodes, (n, n - 1), from the right."""
+    integral: Floats
+    """Integrals from -1 to the nodes, (n, n), from the right."""
     last: Floats
     """The last three Chebyshev coefficients, (n, 3), from the right."""
 
@@ -82,11 +82,12 @@ def _rule(n: int) -> _Rule:
     points = y[:-1, None] + half[:, None] * (x + 1.0)
     basis = interpolation(y, weights, points.ravel()).reshape(n - 1, len(x), n)
     pieces = np.einsum("j,g,jgi->ij", half, w, basis)
+    integral = np.concatenate([np.zeros((n, 1)), np.cumsum(pieces, axis=1)], axis=1)
     degrees = np.arange(n - 3, n)
     cosines = np.cos(degrees * np.pi * (n - 1 - k)[:, None] / (n - 1))
     scale = np.where(degrees == n - 1, 1.0, 2.0) / (n - 1)
     last = cosines * scale * np.where((k == 0) | (k == n - 1), 0.5, 1.0)[:, None]
-    return _Rule(y, weights, np.ascontiguousarray(slope.T), np.ascontiguousarray(pieces), last)
+    return _Rule(y, weights, np.ascontiguousarray(slope.T), integral, last)
 
 
 def interpolation(nodes: Floats, weights: Floats, y: Floats) -> Floats:
@@ -114,6 +115,7 @@ class PanelGrid:
         self.offsets = np.concatenate([[0], np.cumsum([panel.nodes for panel in self.panels])])
         pairs = list(zip(self.panels, self.rules, strict=True))
         self.y: Floats = np.concatenate([rule.y for rule in self.rules])
+        self.weights: Floats = np.concatenate([rule.weights for rule in self.rules])
         self.times: Floats = np.concatenate([panel.time(rule.y) for panel, rule in pairs])
         self.rates: Floats = np.concatenate([panel.rate(rule.y) for panel, rule in pairs])
         for i, panel in enumerate(self.panels):
@@ -123,16 +125,6 @@ class PanelGrid:
     def horizon(self) -> float:
         """The end of the last panel."""
         return self.panels[-1].end
-
-    @cached_property
-    def left(self) -> Array:
-        """Index of the left node of each interval between neighbouring nodes of a panel."""
-        return np.concatenate([np.arange(a, b - 1) for a, b in zip(self.offsets, self.offsets[1:], strict=False)])
-
-    @cached_property
-    def panel_of_node(self) -> Array:
-        """Number of the panel of each node."""
-        return np.repeat(np.arange(len(self.panels)), np.diff(self.offsets))
 
     def slices(self) -> Iterator[tuple[slice, Panel, _Rule]]:
         """Yield where in the node axis each panel stands, the panel and its rule."""
@@ -150,12 +142,12 @@ class PanelGrid:
         """Return d/dt of values (…, T) at the nodes."""
         return self.slope(values) / self.rates
 
-    def pieces(self, values: Floats) -> Floats:
-        """Return the integrals over time between neighbouring nodes, (…, T - number of panels)."""
-        out = np.empty((*values.shape[:-1], len(self.left)))
+    def integral(self, values: Floats) -> Floats:
+        """Return the integrals over time from the start of each panel to its nodes, (…, T)."""
+        out = np.zeros_like(values)
         weighted = values * self.rates
-        for i, (where, _, rule) in enumerate(self.slices()):
-            out[..., where.start - i : where.stop - i - 1] = weighted[..., where] @ rule.pieces
+        for where, _, rule in self.slices():
+            out[..., where] = weighted[..., where] @ rule.integral
         return out
 
     def tail(self, values: Floats) -> Floats:
@@ -167,25 +159,22 @@ class PanelGrid:
     def evaluate(self, values: Floats, times: Floats) -> Floats:
         """Return values (…, T) interpolated at times (t,); before the first node the first value."""
         out = np.empty((*values.shape[:-1], len(times)))
-        starts = np.array([panel.start for panel in self.panels])
-        owner = np.clip(np.searchsorted(starts, times, side="right") - 1, 0, len(self.panels) - 1)
-        for i, (where, panel, rule) in enumerate(self.slices()):
-            mine = owner == i
+        panels, y = self.locate(times)
+        for i, (where, _, rule) in enumerate(self.slices()):
+            mine = panels == i
             if mine.any():
-                y = np.clip(panel.y(np.maximum(times[mine], panel.start)), -1.0, 1.0)
-                out[..., mine] = values[..., where] @ interpolation(rule.y, rule.weights, y).T
+                out[..., mine] = values[..., where] @ interpolation(rule.y, rule.weights, y[mine]).T
         return out
 
-    def at(self, rows: Array, panels: Array, y: Floats, *values: Floats) -> list[Floats]:
-        """Return each of `values` (b, T) at scattered points: member rows[i], panel panels[i], y[i]; shape (r,)."""
-        out = [np.empty(len(rows)) for _ in values]
-        for i, (where, _, rule) in enumerate(self.slices()):
-            mine = np.flatnonzero(panels == i)
-            if mine.size:
-                matrix = interpolation(rule.y, rule.weights, y[mine])
-                for result, value in zip(out, values, strict=True):
-                    result[mine] = np.einsum("rn,rn->r", matrix, value[rows[mine], where])
-        return out
+    def locate(self, times: Floats) -> tuple[Array, Floats]:
+        """Return panel and y of times (r,); times before the first panel are moved to its start."""
+        starts = np.array([panel.start for panel in self.panels])
+        panels = np.clip(np.searchsorted(starts, times, side="right") - 1, 0, len(starts) - 1)
+        y = np.empty(len(times))
+        for i, panel in enumerate(self.panels):
+            mine = panels == i
+            y[mine] = np.clip(panel.y(np.maximum(times[mine], panel.start)), -1.0, 1.0)
+        return panels, y
 
     def time_at(self, panels: Array, y: Floats) -> Floats:
         """Return the time of scattered points."""

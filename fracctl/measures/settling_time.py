@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from fracctl.arrays import Floats
+from fracctl.arrays import Array, Booleans, Floats
 from fracctl.errors import ArgumentError
-from fracctl.features import last_crossing
+from fracctl.features import last_crossing, value_at
 from fracctl.trajectory import Trajectory
 
 
@@ -54,19 +54,11 @@ class SettlingTime:
             pending = pending[number[pending] > 0]
         return np.where(np.isfinite(exact), number * step, np.inf)
 
-    def _outside(self, trajectory: Trajectory, rows: np.ndarray, times: Floats) -> np.ndarray:
-        grid = trajectory.grid
-        starts = np.array([panel.start for panel in grid.panels])
-        panels = np.clip(np.searchsorted(starts, times, side="right") - 1, 0, len(starts) - 1)
-        y = np.empty(len(times))
-        for i, panel in enumerate(grid.panels):
-            mine = panels == i
-            y[mine] = np.clip(panel.y(np.maximum(times[mine], panel.start)), -1.0, 1.0)
-        magnitudes = [
-            np.abs(grid.at(rows, panels, y, trajectory.positions[:, i])[0])
-            for i in range(trajectory.positions.shape[1])
-        ]
-        outside: np.ndarray = np.max(magnitudes, axis=0) > self.threshold
+    def _outside(self, trajectory: Trajectory, rows: Array, times: Floats) -> Booleans:
+        positions = trajectory.positions[rows]
+        components = range(positions.shape[1])
+        magnitudes = [np.abs(value_at(trajectory.grid, positions[:, i], times)) for i in components]
+        outside: Booleans = np.max(magnitudes, axis=0) > self.threshold
         return outside
 
 
