@@ -19,7 +19,7 @@ from matplotlib.ticker import MaxNLocator
 
 from fracctl.arrays import Floats
 from fracctl.figures import labels
-from fracctl.figures.results import FigureError, Results, Row, Selection, optimum
+from fracctl.figures.results import FigureError, Results, Row, Selection, objective_scale, optimum
 from fracctl.figures.style import COLOUR_MAP, FULL_WIDTH_IN, STAR
 
 _PANEL_HEIGHT_IN = 2.7
@@ -53,13 +53,15 @@ def build(results: Results, selection: Selection) -> tuple[Figure, pd.DataFrame]
         raise FigureError(f"contours need a grid that varies two gains; this run varies {found}")
     x, y = results.varied
     rows = [_panels(results, selection, name) for name in selection.initial_conditions]
-    figure = Figure(figsize=(FULL_WIDTH_IN, _PANEL_HEIGHT_IN * len(rows) + 0.35), layout="constrained")
-    axes = figure.subplots(len(rows), max(map(len, rows)), squeeze=False, sharex=True, sharey=True)
-    scale = math.tau if selection.columns == ("settling_time",) else 1.0
+    columns = max(map(len, rows))
+    width = FULL_WIDTH_IN if columns > 1 else 0.6 * FULL_WIDTH_IN
+    figure = Figure(figsize=(width, _PANEL_HEIGHT_IN * len(rows) + 0.35), layout="constrained")
+    axes = figure.subplots(len(rows), columns, squeeze=False, sharex=True, sharey=True)
+    scale, title = objective_scale(results, selection)
     for panels, line in zip(rows, axes, strict=True):
         contours = _row(panels, line, selection.value_column, scale, (x, y))
         bar = figure.colorbar(contours, ax=list(line), pad=0.02, aspect=24, ticks=contours.levels, spacing="uniform")
-        bar.set_label(labels.objective(selection.columns) + (f" ({results.period_name})" if scale != 1.0 else ""))
+        bar.set_label(title)
         line[0].set_ylabel(f"Gain ${labels.symbol(y)}$")
     for ax in axes[-1]:
         ax.set_xlabel(f"Gain ${labels.symbol(x)}$")

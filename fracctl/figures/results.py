@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -10,6 +11,7 @@ from typing import Any
 import pandas as pd
 
 from fracctl.errors import ConfigurationError, RunError, suggestion
+from fracctl.figures import labels
 from fracctl.plants import Chief
 from fracctl.store import RunDirectory
 from fracctl.units import Scales
@@ -144,6 +146,12 @@ def chosen(optima: pd.DataFrame, selection: Selection, initial_condition: str, k
     """Rows of optima of one kind for the selected objective and one initial condition."""
     objective = optima["objective_name"] == selection.objective
     return optima[objective & (optima["initial_condition"] == initial_condition) & (optima["kind"] == kind)]
+
+
+def objective_scale(results: Results, selection: Selection) -> tuple[float, str]:
+    """What the objective is divided by on an axis, and the axis' label: settling times are shown in periods."""
+    words = labels.objective(selection.columns)
+    return (math.tau, f"{words} ({results.period_name})") if selection.columns == ("settling_time",) else (1.0, words)
 
 
 def same_point(first: Row, second: Row) -> bool:

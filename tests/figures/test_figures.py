@@ -68,7 +68,7 @@ def test_files_are_the_same_whatever_the_users_settings_are(run: RunDirectory) -
 
 
 def test_files_carry_no_dates_and_only_embedded_fonts(run: RunDirectory) -> None:
-    for path in draw(run, ALL):
+    for path in draw(run, {"order": {"type": "objective_against_order"}}):
         content = path.read_bytes()
         assert b"CreationDate" not in content
         assert b"/Type3" not in content
@@ -160,6 +160,15 @@ def test_a_plant_with_two_components_has_two_rows_of_panels(tmp_path: Path) -> N
     assert "position $v$" in v.get_ylabel()
     assert line_xy(inset(u), "*")
     assert not line_xy(v, "*"), "the settling time is that of u"
+
+
+def test_settling_times_are_shown_in_orbits(run: RunDirectory) -> None:
+    results = Results(run)
+    with style():
+        figure, table = objective_against_order.build(results, select(results, {"initial_conditions": ["ic1"]}))
+    (ax,) = figure.axes
+    np.testing.assert_allclose(ax.lines[0].get_ydata(), table["settling_time"] / (2 * np.pi), rtol=1e-15)
+    assert figure.get_supylabel() == r"Settling time $\mathrm{ST}$ (orbits)"
 
 
 def test_objective_against_order_shows_every_slice(run: RunDirectory) -> None:
