@@ -64,6 +64,7 @@ class ProcessExecutor(Executor):
             self._kill()
         self._threads.shutdown(wait, cancel_futures=cancel_futures)
         if wait:
+            self._kill()
             for worker in self._workers:
                 worker.end()
             self._workers.clear()
@@ -98,7 +99,8 @@ class ProcessExecutor(Executor):
         with self._lock:
             self._closed = True
             for worker in self._workers:
-                worker.process.kill()
+                with contextlib.suppress(ProcessLookupError):
+                    os.killpg(worker.process.pid, signal.SIGKILL)
 
 
 class _Worker:
@@ -107,7 +109,7 @@ class _Worker:
     def __init__(self, environment: dict[str, str]) -> None:
         self._connection, theirs = multiprocessing.Pipe()
         with theirs:
-            program = _PROGRAM.format(path=sys.path, descriptor=theirs.fileno())
+            program = _PROGRAM.format(path=[str(entry) for entry in sys.path], descriptor=theirs.fileno())
             self.process = subprocess.Popen(
                 [sys.executable, "-c", program],
                 stdin=subprocess.PIPE,

@@ -54,9 +54,13 @@ class RowStore:
     def load(self, block: Block) -> Rows | None:
         """Return the rows of a block that was computed before, None if it is to be computed."""
         rows = self._parts.load(block.number)
-        if rows is not None:
-            self.numbers.append(block.number)
-            self.continued += 1
+        if rows is None:
+            return None
+        if any(rows[name][: block.size].tobytes() != values.tobytes() for name, values in block.design.items()):
+            _log.warning("block %d is computed again: it was stored with other points", block.number)
+            return None
+        self.numbers.append(block.number)
+        self.continued += 1
         return rows
 
     def save(self, block: Block, outcome: Outcome) -> Rows:

@@ -80,12 +80,12 @@ def test_a_block_whose_worker_dies_is_tried_again(tmp_path: Path, undisturbed: P
     ],
 )
 def test_a_block_that_always_fails_harms_no_other(tmp_path: Path, kind: str, reason: str) -> None:
-    found = perform(job(tmp_path, LOCAL, faults=[{"kind": kind, "alpha_w": 0.9}]))
+    found = perform(job(tmp_path, LOCAL | {"workers": 1}, faults=[{"kind": kind, "alpha_w": 0.9}]))
     failed = found.evaluations[found.evaluations["status"] == "failed"]
     assert failed["alpha_w"].unique().tolist() == [0.9]
     assert all(reason in text for text in failed["reason"].unique())
     assert found.summary["status"] == "incomplete"
-    assert perform(job(tmp_path, LOCAL)).summary["status"] == "finished"
+    assert perform(job(tmp_path)).summary["status"] == "finished"
 
 
 def test_workers_that_all_die_end_the_run(tmp_path: Path) -> None:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +14,12 @@ import pyarrow.parquet as pq
 import pytest
 
 from fracctl.errors import RunError
+from fracctl.execution.computation import Job
 from fracctl.execution.perform import perform
 from fracctl.store import RunDirectory
 from fracctl.store.lock import exclusive
+from fracctl.surveys import Block
+from fracctl.surveys.base import Rows
 from tests.execution.fakes import N_BLOCKS, N_POINTS, job
 from tests.store.disks import full_after, small_disk
 
@@ -277,3 +282,67 @@ def test_two_processes_do_not_write_the_same_run(tmp_path: Path) -> None:
 def test_the_stored_configuration_is_the_given_one(tmp_path: Path) -> None:
     one = job(tmp_path)
     assert RunDirectory(perform(one).run_directory).run_json["configuration"] == one.configuration
+
+
+class Descent:
+    """A search: each of four blocks is a row of gains about the best point of the block before."""
+
+    n_points = None
+    slice = None
+    baseline: Mapping[str, float] = {}
+
+    def __init__(self) -> None:
+        self._centre, self._asked, self._told = 0.0, 0, 0
+
+    @property
+    def finished(self) -> bool:
+        return self._told == 4
+
+    def ask(self) -> list[Block]:
+        if self._asked > self._told or self.finished:
+            return []
+        k_p = self._centre + np.linspace(-0.3, 0.3, 7)
+        self._asked += 1
+        design = {"alpha_w": np.full(7, 0.9), "k_p_w": k_p, "k_d_w": np.full(7, 1.8)}
+        return [Block(self._told, 7 * self._told, design)]
+
+    def tell(self, number: int, rows: Rows) -> None:
+        assert number == self._told
+        self._centre = float(rows["k_p_w"][np.argmin(rows["settling_time"])])
+        self._told += 1
+
+
+def search(folder: Path, survey: Callable[[], Any] = Descent) -> Job:
+    return replace(job(folder), survey=survey)
+
+
+def test_a_search_continues_by_replay(tmp_path: Path) -> None:
+    whole = perform(search(tmp_path / "whole"))
+    assert whole.optima["k_p_w"].iloc[0] == pytest.approx(0.9)
+    with pytest.raises(KeyboardInterrupt):
+        perform(search(tmp_path / "parts"), progress=Watch(interrupt_after=20))
+    continued = perform(search(tmp_path / "parts"))
+    assert "4 blocks: 2 were stored" in (continued.run_directory / "run.log").read_text()
+    assert tables_of(continued.run_directory) == tables_of(whole.run_directory)
+
+
+def test_rows_of_other_points_answer_no_question(tmp_path: Path) -> None:
+    class Elsewhere(Descent):
+        def __init__(self) -> None:
+            super().__init__()
+            self._centre = 0.05
+
+    with pytest.raises(KeyboardInterrupt):
+        perform(search(tmp_path), progress=Watch(interrupt_after=20))
+    other = perform(search(tmp_path, Elsewhere))
+    assert "4 blocks: 0 were stored" in (other.run_directory / "run.log").read_text()
+    assert len(other.evaluations) == 2 * 28
+
+
+def test_a_survey_that_asks_for_nothing_more_is_an_error(tmp_path: Path) -> None:
+    class Stuck(Descent):
+        def ask(self) -> list[Block]:
+            return [] if self._asked else super().ask()
+
+    with pytest.raises(RunError, match="the survey is not finished, but has no further points"):
+        perform(search(tmp_path, Stuck))
