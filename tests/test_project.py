@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import ast
+import doctest
 import re
+import shlex
 import subprocess
 import sys
 import tomllib
@@ -14,6 +16,8 @@ from pathlib import Path
 import pytest
 from hatchling.builders.wheel import WheelBuilder
 
+from fracctl.cli.main import main
+
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 
@@ -21,6 +25,11 @@ MACHINE_PATHS = r"(?<![\w.~$}])/(?:" + "|".join(["work", "home", "root", "Users"
 INDEX_ADDRESSES = "|".join(
     ["pypi" + r"\.org", "python" + r"hosted\.org", "index" + "[-_]url", "find" + "[-_]links", r"/" + r"simple\b"]
 )
+
+
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+(SHELL,) = re.findall(r"```sh\n(.*?)```", README, flags=re.DOTALL)
+README_COMMANDS = [shlex.split(line, comments=True)[1:] for line in SHELL.splitlines()]
 
 
 def tracked_files() -> list[Path]:
@@ -115,6 +124,18 @@ def test_documents_name_targets_that_exist() -> None:
         text = (ROOT / name).read_text(encoding="utf-8")
         mentioned = set(re.findall(r"(?:^|`)make (?:[A-Z]+=\S+ )?([a-z-]+)", text, flags=re.MULTILINE))
         assert mentioned <= targets, name
+
+
+def test_the_readme_shows_what_comes_out() -> None:
+    failures, tests = doctest.testfile(str(ROOT / "README.md"), module_relative=False)
+    assert tests > 5
+    assert failures == 0
+
+
+@pytest.mark.parametrize("command", README_COMMANDS)
+def test_commands_of_the_readme_are_valid(command: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    compose_only = ["--cfg", "job"] if command[0] == "run" else []
+    assert main([word for word in command if word != "--json"] + compose_only) == 0, capsys.readouterr().err
 
 
 def test_documents_name_files_that_exist() -> None:
