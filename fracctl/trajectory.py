@@ -30,8 +30,8 @@ class Trajectory:
     """υ at the nodes, (b, m, T)."""
     initial_controls: Floats
     """υ(0+), (b, m); a law with order α < 1 rises from it as t^(1-α)."""
-    rates: Floats
-    """ξ' at the nodes, (b, m, T)."""
+    rates: Floats | None
+    """ξ' at the nodes, (b, m, T); None where the solver left them to the derivative of the interpolant."""
     auxiliary: Floats
     """z at the nodes, (b, q, T)."""
     status: Array
@@ -72,7 +72,8 @@ class Trajectory:
             ArgumentError: a time lies outside [0, horizon].
         """
         t = self._checked(times)
-        values = np.concatenate([self.positions, self.rates, self.auxiliary], axis=1)
+        rates = self.grid.derivative(self.positions) if self.rates is None else self.rates
+        values = np.concatenate([self.positions, rates, self.auxiliary], axis=1)
         out = np.swapaxes(self.grid.evaluate(values, t), 1, 2)
         first = self.grid.panels[0].start
         early = t < first

@@ -41,14 +41,20 @@ class Entry:
     def _lead(self) -> tuple[int, ...]:
         return np.broadcast_shapes(self.coefficients.shape[:-1], self.exponents.shape[:-1])
 
-    def derivative(self) -> Entry:
-        """Return the derivative with respect to σ."""
-        return Entry(self.coefficients * self.exponents, self.exponents - 1.0)
+    def table(self, sigma: Complexes, batch: int) -> tuple[Floats, Floats, Floats]:
+        """Return coefficients (b, J) and real and imaginary powers at σ (P,), each (1, J, P) or (b, J, P)."""
+        coefficients = np.broadcast_to(self.coefficients, (batch, self.exponents.shape[-1]))
+        basis = powers(sigma, self.exponents)
+        basis = basis[None] if self.exponents.ndim == 1 else basis
+        return np.ascontiguousarray(coefficients), np.ascontiguousarray(basis.real), np.ascontiguousarray(basis.imag)
 
     def magnitude(self, radius: Floats) -> Floats:
         """Return Σ_e |c_e| r^e for radii r (b,)."""
         total: Floats = np.sum(np.abs(self.coefficients) * radius[:, None] ** self.exponents, axis=-1)
         return total
+
+
+_ZERO = Entry(np.zeros(1), np.zeros(1))
 
 
 class CharacteristicMatrix:
@@ -71,14 +77,30 @@ class CharacteristicMatrix:
         """Return the entries at nodes σ, each (k,) or (b, k), or None where the entry is zero."""
         return [[None if entry is None else entry(sigma) for entry in row] for row in self.entries]
 
+    def blocks(self) -> list[list[int]]:
+        """Return the groups of coordinates that are not coupled to each other."""
+        groups: list[set[int]] = []
+        for i in range(self.size):
+            linked = {i} | {k for k in range(self.size) if self.entries[i][k] or self.entries[k][i]}
+            joined = [group for group in groups if group & linked]
+            groups = [group for group in groups if not group & linked] + [linked.union(*joined)]
+        return sorted(sorted(group) for group in groups)
+
+    def tables(self, block: list[int], sigma: Complexes) -> tuple[tuple[Floats, Floats, Floats], ...]:
+        """Return the tables of the entries of a block at σ (P,), row by row."""
+        entries = [self.entries[i][k] or _ZERO for i in block for k in block]
+        return tuple(entry.table(sigma, self.batch) for entry in entries)
+
     def take(self, rows: Array) -> CharacteristicMatrix:
         """Return the matrix of the members `rows`."""
         return CharacteristicMatrix(self.system.take(rows))
 
-    def determinant(self, sigma: Complexes) -> Complexes:
-        """Return det M̃ at nodes σ, (k,) shared or (b, k) one set a member, as (b, k)."""
+    def determinant(self, sigma: Complexes, block: list[int] | None = None) -> Complexes:
+        """Return det M̃, or that of a block of it, at nodes σ, (k,) shared or (b, k) one set a member, as (b, k)."""
         shape = (self.batch, sigma.shape[-1])
-        return np.broadcast_to(determinant(self(sigma), shape), shape)
+        rows = range(self.size) if block is None else block
+        entries = [[entry(sigma) if (entry := self.entries[i][k]) else None for k in rows] for i in rows]
+        return np.broadcast_to(determinant(entries, shape), shape)
 
 
 def determinant(entries: list[list[Complexes | None]], shape: tuple[int, ...]) -> Complexes:

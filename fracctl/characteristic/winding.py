@@ -11,6 +11,7 @@ import numpy as np
 
 from fracctl.arrays import Booleans, Complexes, Floats
 from fracctl.characteristic.bounds import pole_radius
+from fracctl.characteristic.kernels import trace
 from fracctl.characteristic.matrix import CharacteristicMatrix
 
 _INNER = 1e-5
@@ -66,7 +67,33 @@ def _none_right_of(matrix: CharacteristicMatrix, abscissa: Floats, outer: Floats
 
 def _turns(matrix: CharacteristicMatrix, path: Complexes) -> tuple[Floats, Booleans]:
     """Return phase change over 2π along `path` (b,), and whether every step of it was resolved."""
-    values = matrix.determinant(path)
+    turns, resolved = np.zeros(matrix.batch), np.ones(matrix.batch, dtype=bool)
+    for block in matrix.blocks():
+        part_turns, part_resolved = _block_turns(matrix, block, path)
+        turns += part_turns
+        resolved &= part_resolved
+    return turns, resolved
+
+
+def _block_turns(matrix: CharacteristicMatrix, block: list[int], path: Complexes) -> tuple[Floats, Booleans]:
+    if len(block) > 2:
+        values = matrix.determinant(path, block)
+        turns, steps = crossings(values)
+        ambiguous, last = steps.any(axis=1), values[:, -1].real
+    else:
+        counts, ambiguous, ends = trace(matrix.tables(block, path))
+        turns, last = counts.astype(np.float64), ends[1]
+    turns = turns + 0.5 * (last < 0.0)
+    resolved = np.ones(matrix.batch, dtype=bool)
+    doubtful = np.flatnonzero(ambiguous)
+    if doubtful.size:
+        turns[doubtful], resolved[doubtful] = _refined(matrix.take(doubtful), block, path)
+    return turns, resolved
+
+
+def _refined(matrix: CharacteristicMatrix, block: list[int], path: Complexes) -> tuple[Floats, Booleans]:
+    """Halve the steps that turn by more than a right angle until none does, or they are as short as rounding."""
+    values = matrix.determinant(path, block)
     turns, ambiguous = crossings(values)
     resolved = np.ones(len(turns), dtype=bool)
     rows, steps = np.nonzero(ambiguous)
@@ -74,19 +101,17 @@ def _turns(matrix: CharacteristicMatrix, path: Complexes) -> tuple[Floats, Boole
     left_value, right_value = values[rows, steps], values[rows, steps + 1]
     while rows.size:
         middle = _between(left, right)
-        value = matrix.take(rows).determinant(middle[:, None])[:, 0]
+        value = matrix.take(rows).determinant(middle[:, None], block)[:, 0]
         stuck = np.abs(right - left) < _SMALLEST_STEP * np.abs(middle)
         resolved[rows[stuck]] = False
-        halves = [(left, left_value, middle, value), (middle, value, right, right_value)]
         pending = []
-        for a, value_a, b, value_b in halves:
+        for a, value_a, b, value_b in [(left, left_value, middle, value), (middle, value, right, right_value)]:
             turn, open_ = crossings(np.stack([value_a, value_b], axis=1))
             np.add.at(turns, rows, turn)
             again = open_[:, 0] & ~stuck
             pending.append((rows[again], a[again], b[again], value_a[again], value_b[again]))
         rows, left, right, left_value, right_value = (np.concatenate(part) for part in zip(*pending, strict=True))
-    end = values[:, -1].real < 0.0
-    return turns + 0.5 * end, resolved
+    return turns + 0.5 * (values[:, -1].real < 0.0), resolved
 
 
 def _between(left: Complexes, right: Complexes) -> Complexes:

@@ -48,7 +48,7 @@ class Window:
     _kernels: dict[float, tuple[Floats, Floats]] = field(default_factory=dict)
 
     def kernels(self, exponent: float) -> tuple[Floats, Floats]:
-        """Return real matrices (2N, t) and (2N + 2, checked) that take interleaved Z(σ) to (σ^e Z)(t)."""
+        """Return real matrices (2N, t) and (2N + 2, checked) that take Z(σ), real parts first, to (σ^e Z)(t)."""
         if exponent not in self._kernels:
             if len(self._kernels) > 64:
                 self._kernels.clear()
@@ -62,7 +62,7 @@ class Window:
     def _matrix(self, which: slice, powers: Complexes, times: Floats) -> Floats:
         complex_kernel = powers[which, None] * np.exp(self.path[which, None] * times)
         matrix = np.empty((2 * len(complex_kernel), len(times)))
-        matrix[0::2], matrix[1::2] = complex_kernel.imag, complex_kernel.real
+        matrix[: len(complex_kernel)], matrix[len(complex_kernel) :] = complex_kernel.imag, complex_kernel.real
         return matrix
 
 

@@ -12,16 +12,18 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import rgamma
 
-from fracctl.arrays import Booleans, Complexes, Floats
-from fracctl.characteristic.matrix import CharacteristicMatrix, determinant, stack
+from fracctl.arrays import Array, Booleans, Complexes, Floats
+from fracctl.characteristic import kernels
+from fracctl.characteristic.matrix import CharacteristicMatrix, stack
 from fracctl.characteristic.winding import crossings
 from fracctl.fractional.series import short_time_series
 from fracctl.fractional.system import LinearFractionalSystem
+from fracctl.fractional.terms import powers
 from fracctl.solvers.contour_plan import Plan, Window
 
 SERIES_ORDER = 5.0
-Request = tuple[int, float] | tuple[int, int, int]
-"""(component, order), or (component, term, column) for an order of the control's term that members do not share."""
+Halves = tuple[Floats, Floats]
+"""Z̃ at the odd and at the even nodes of a contour, (k, b, 2N) and (k, b, 2N + 2), real parts first."""
 
 
 @dataclass(frozen=True)
@@ -168,79 +170,95 @@ def _start(
 
 def _transforms(
     matrix: CharacteristicMatrix, y0: Floats, y0_rate: Floats, window: Window
-) -> tuple[list[Complexes], Booleans]:
-    """Return Z̃ of each coordinate, (k, b, 2N + 1), and whether the contour encloses all poles, (b,)."""
-    last = 2 * window.nodes + 1
-    entries = matrix(window.path)
-    shape = (matrix.batch, len(window.path))
-    det = np.broadcast_to(determinant(entries, shape), shape)
-    turns, ambiguous = crossings(det)
-    enclosed = (turns == 0.0) & ~ambiguous.any(axis=1) & (det[:, 0].real > 0.0)
-    inside = [[None if entry is None else entry[..., :last] for entry in row] for row in entries]
-    right = _right_hand_side(matrix.system, y0, y0_rate, window.path[:last])
-    return _solved(inside, right, det[:, :last]), enclosed
+) -> tuple[list[Halves], Booleans]:
+    """Return Z̃ of each coordinate at odd and even nodes, and whether the contour encloses all poles, (b,)."""
+    k, b, _ = y0.shape
+    n = window.nodes
+    enclosed = np.ones(b, dtype=bool)
+    transforms: dict[int, Halves] = {}
+    for block in matrix.blocks():
+        sources = tuple(_source(matrix.system, i, y0, y0_rate, window.path) for i in block)
+        odd, even = np.empty((len(block), k, b, 2 * n)), np.empty((len(block), k, b, 2 * n + 2))
+        if len(block) <= 2:
+            turns, ambiguous, ends = kernels.solve(matrix.tables(block, window.path), sources, n, odd, even)
+        else:
+            turns, ambiguous, ends = _solve_large(matrix, block, sources, window, odd, even)
+        enclosed &= (turns == 0) & ~ambiguous & (ends[0] > 0.0)
+        transforms |= {i: (odd[j], even[j]) for j, i in enumerate(block)}
+    return [transforms[i] for i in range(matrix.size)], enclosed
 
 
-def _right_hand_side(
-    system: LinearFractionalSystem, y0: Floats, y0_rate: Floats, sigma: Complexes
-) -> list[Complexes | None]:
-    """Return r_i = Σ_{β>1} A_j σ^(β-2) y'(0) - Σ_{β≤0} A_j σ^(β-1) y(0), each (k, b, nodes) or None if zero."""
-    b = system.batch or 1
-    right: list[Complexes | None] = [None] * system.size
+def _source(
+    system: LinearFractionalSystem, row: int, y0: Floats, y0_rate: Floats, sigma: Complexes
+) -> tuple[Floats, Floats, Floats]:
+    """Return r_i = Σ_{β>1} A_j σ^(β-2) y'(0) - Σ_{β≤0} A_j σ^(β-1) y(0) as coefficients (k, b, Q) and powers."""
+    k, b, _ = y0.shape
+    coefficients, exponents = [np.zeros((k, b))], [np.zeros(())]
     for term in system.dynamics:
-        matrix = np.broadcast_to(term.matrix, (b, *term.matrix.shape[-2:]))
-        for row, column in np.argwhere(matrix.any(axis=0)):
+        for column in np.flatnonzero(term.matrix[..., row, :].reshape(-1, system.size).any(axis=0)):
             order = term.orders[..., column]
             if np.all(order <= 0.0):
-                coefficient, exponent = -matrix[:, row, column] * y0[..., column], order - 1.0
+                coefficient, exponent = -term.matrix[..., row, column] * y0[..., column], order - 1.0
             elif np.all(order > 1.0):
-                coefficient, exponent = matrix[:, row, column] * y0_rate[..., column], order - 2.0
+                coefficient, exponent = term.matrix[..., row, column] * y0_rate[..., column], order - 2.0
             else:
                 continue
             if np.any(coefficient):
-                power = np.exp(np.asarray(exponent)[..., None] * np.log(sigma)) if np.any(exponent) else 1.0
-                part = coefficient[..., None] * power
-                right[row] = part if right[row] is None else right[row] + part
-    return right
+                coefficients.append(np.broadcast_to(coefficient, (k, b)))
+                exponents.append(exponent)
+    columns = np.stack(np.broadcast_arrays(*exponents), axis=-1)
+    basis = powers(sigma, np.atleast_2d(columns))
+    merged = np.ascontiguousarray(np.stack(coefficients, axis=-1))
+    return merged, np.ascontiguousarray(basis.real), np.ascontiguousarray(basis.imag)
 
 
-def _solved(entries: list[list[Complexes | None]], right: list[Complexes | None], det: Complexes) -> list[Complexes]:
-    """Solve M̃ Z̃ = r at every node."""
-    size = len(entries)
-    shape = next((np.broadcast_shapes(r.shape, det.shape) for r in right if r is not None), (1, *det.shape))
-    zero = np.zeros(shape, dtype=np.complex128)
-    if all(r is None for r in right):
-        return [zero] * size
-    if size == 1:
-        assert right[0] is not None
-        return [right[0] / det]
-    if size == 2:
-        inverse = 1.0 / det
-        (a, b), (c, d) = entries
-        first = [_product(d, right[0]), _product(b, right[1])]
-        second = [_product(a, right[1]), _product(c, right[0])]
-        return [(plus - minus) * inverse for plus, minus in (first, second)]
-    vector = np.stack([np.broadcast_to(zero if r is None else r, shape) for r in right], axis=-1)
-    matrices = np.broadcast_to(stack(entries, det.shape), (*shape, size, size))
-    solution = np.linalg.solve(matrices, vector[..., None])[..., 0]
-    return [np.ascontiguousarray(solution[..., i]) for i in range(size)]
+def _solve_large(
+    matrix: CharacteristicMatrix,
+    block: list[int],
+    sources: tuple[tuple[Floats, Floats, Floats], ...],
+    window: Window,
+    odd: Floats,
+    even: Floats,
+) -> tuple[Array, Booleans, Floats]:
+    """Solve three or more coupled coordinates by LAPACK, node by node."""
+    shape = (matrix.batch, len(window.path))
+    entries = [[entry(window.path) if (entry := matrix.entries[i][k]) else None for k in block] for i in block]
+    matrices = stack(entries, shape)
+    det = np.linalg.det(matrices)
+    turns, steps = crossings(det)
+    ambiguous: Booleans = steps.sum(axis=1) > 0
+    right = np.stack([c @ re + 1j * (c @ im) for c, re, im in (_aligned(source) for source in sources)], axis=-1)
+    last = 2 * window.nodes + 1
+    solution = np.linalg.solve(matrices[:, :last], right[..., :last, :, None])[..., 0]
+    for j in range(len(block)):
+        for out, start in ((odd, 1), (even, 0)):
+            values = solution[..., start::2, j]
+            out[j] = np.concatenate([values.real, values.imag], axis=-1)
+    return turns.astype(np.int64), ambiguous, np.stack([det[:, 0].real, det[:, -1].real])
 
 
-def _product(entry: Complexes | None, right: Complexes | None) -> Complexes | float:
-    return 0.0 if entry is None or right is None else entry * right
+def _aligned(source: tuple[Floats, Floats, Floats]) -> tuple[Floats, Floats, Floats]:
+    """Give coefficients (k, b, Q) an axis for matrix products with powers (b, Q, P) of members' own exponents."""
+    c, re, im = source
+    return (c, re[0], im[0]) if len(re) == 1 else (c[..., None, :], re, im)
 
 
-def _inverse(window: Window, transform: Complexes, order: Floats, highest: float) -> tuple[Floats, Floats]:
+def _inverse(window: Window, transform: Halves, order: Floats, highest: float) -> tuple[Floats, Floats]:
     """Return (σ^order Z)(t) at the window's times and, by the other rule, at its checked times, (k, b, t)."""
+    odd, even = transform
     if order.ndim == 0:
         middle, ends = window.kernels(float(order) - highest)
-    else:
-        middle, ends = window.kernels(-highest)
-        sigma = window.path[: transform.shape[-1]]
-        transform = transform * np.exp(order[:, None] * np.log(sigma))
-    odd = np.ascontiguousarray(transform[..., 1::2]).view(np.float64)
-    even = np.ascontiguousarray(transform[..., 0::2]).view(np.float64)
-    return odd @ middle, even @ ends
+        return odd @ middle, even @ ends
+    middle, ends = window.kernels(-highest)
+    sigma = window.path[: 2 * window.nodes + 1]
+    return _times_power(odd, sigma[1::2], order) @ middle, _times_power(even, sigma[0::2], order) @ ends
+
+
+def _times_power(halves: Floats, sigma: Complexes, order: Floats) -> Floats:
+    """Multiply transforms (k, b, 2N), real parts first, by σ^order with one order a member."""
+    n = len(sigma)
+    product = (halves[..., :n] + 1j * halves[..., n:]) * powers(sigma, order)
+    return np.concatenate([product.real, product.imag], axis=-1)
 
 
 def _initial_value(wanted: _Derivative, y0: Floats, y0_rate: Floats, times: Floats) -> Floats | None:

@@ -74,14 +74,13 @@ def packed(
     stable = members.stable[chosen]
     status = np.where(good[chosen], "ok", "failed").astype(object)
     status[good[chosen] & np.array([verdict is False for verdict in stable], dtype=bool)] = "unstable"
-    rates = response.rates if response.rates is not None else grid.derivative(response.positions)
     trajectory = Trajectory(
         grid=grid,
         initial_state=flat(members.initial_states()),
         positions=flat(response.positions),
         controls_at_nodes=flat(response.controls),
         initial_controls=flat(response.initial_controls),
-        rates=flat(rates),
+        rates=None if response.rates is None else flat(response.rates),
         auxiliary=flat(response.auxiliary),
         status=np.tile(status, k),
         stable=np.tile(stable, k),

@@ -1,0 +1,155 @@
+"""Compiled loops over members and nodes: determinants of 1×1 and 2×2 matrices, their winding, and solutions.
+
+An entry of M̃ is Σ_e c_e σ^e: coefficients (b, J) times a table of powers at the nodes of a path, (1, J, P) where
+members share the exponents, (b, J, P) otherwise. Real and imaginary parts are separate arrays, so that the inner
+loops over nodes become vector instructions.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numba
+import numpy as np
+
+from fracctl.arrays import Array, Booleans, Floats
+
+Trace = tuple[Array, Booleans, Floats]
+"""Turns of det M̃ along a path (b,), whether a step was ambiguous (b,), real parts at the first and last node (2, b)."""
+
+compiled = numba.njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
+
+
+@compiled
+def _sum(coefficients: Floats, re: Floats, im: Floats, out_re: Floats, out_im: Floats) -> None:
+    """Σ_j c_j (re_j + i im_j) over the nodes of a path."""
+    for n in range(len(out_re)):
+        out_re[n] = 0.0
+        out_im[n] = 0.0
+    for j in range(len(coefficients)):
+        c = coefficients[j]
+        for n in range(len(out_re)):
+            out_re[n] += c * re[j, n]
+            out_im[n] += c * im[j, n]
+
+
+@compiled
+def _turns(re: Floats, im: Floats) -> tuple[int, bool]:
+    """Counter-clockwise crossings of the negative real axis, and whether a step turned by more than a right angle."""
+    turns, ambiguous = 0, False
+    for n in range(len(re) - 1):
+        if re[n] * re[n + 1] + im[n] * im[n + 1] <= 0.0:
+            ambiguous = True
+        elif (im[n] < 0.0) != (im[n + 1] < 0.0) and (re[n] * im[n + 1] - re[n + 1] * im[n]) * (im[n + 1] - im[n]) < 0.0:
+            turns += 1 if im[n + 1] < 0.0 else -1
+    return turns, ambiguous
+
+
+@compiled
+def solve_scalar(entry: Any, source: Any, nodes: int, odd: Floats, even: Floats) -> Trace:
+    """Solve M̃ Z̃ = r for one coordinate at the interlaced nodes of a path.
+
+    Args:
+        entry: coefficients (b, J), real and imaginary powers (1 or b, J, P).
+        source: the same for r, coefficients (k, b, Q).
+        nodes: N; the path begins with N + 1 even and N odd nodes in turn.
+        odd: out, (1, k, b, 2N), real parts then imaginary parts.
+        even: out, (1, k, b, 2N + 2).
+
+    Returns:
+        The trace of det M̃ along the whole path.
+    """
+    c, re, im = entry
+    s, s_re, s_im = source
+    count, length = len(c), re.shape[2]
+    turns, ambiguous, ends = np.empty(count, np.int64), np.empty(count, np.bool_), np.empty((2, count))
+    d_re, d_im, r_re, r_im = np.empty(length), np.empty(length), np.empty(length), np.empty(length)
+    for i in range(count):
+        shared, own = min(i, re.shape[0] - 1), min(i, s_re.shape[0] - 1)
+        _sum(c[i], re[shared], im[shared], d_re, d_im)
+        turns[i], ambiguous[i] = _turns(d_re, d_im)
+        ends[0, i], ends[1, i] = d_re[0], d_re[length - 1]
+        for n in range(2 * nodes + 1):
+            scale = 1.0 / (d_re[n] * d_re[n] + d_im[n] * d_im[n])
+            d_re[n] *= scale
+            d_im[n] *= -scale
+        for k in range(len(s)):
+            _sum(s[k, i], s_re[own], s_im[own], r_re, r_im)
+            for n in range(2 * nodes + 1):
+                x, y = r_re[n] * d_re[n] - r_im[n] * d_im[n], r_re[n] * d_im[n] + r_im[n] * d_re[n]
+                r_re[n], r_im[n] = x, y
+            _split(r_re, r_im, nodes, odd[0, k, i], even[0, k, i])
+    return turns, ambiguous, ends
+
+
+@compiled
+def _split(re: Floats, im: Floats, nodes: int, odd: Floats, even: Floats) -> None:
+    """Write the values at odd and at even nodes, real parts first."""
+    for n in range(nodes):
+        odd[n] = re[2 * n + 1]
+        odd[nodes + n] = im[2 * n + 1]
+        even[n] = re[2 * n]
+        even[nodes + 1 + n] = im[2 * n]
+    even[nodes] = re[2 * nodes]
+    even[2 * nodes + 1] = im[2 * nodes]
+
+
+@compiled
+def solve_pair(entries: Any, sources: Any, nodes: int, odd: Floats, even: Floats) -> Trace:
+    """Solve M̃ Z̃ = r for two coordinates; `entries` holds M̃₁₁, M̃₁₂, M̃₂₁, M̃₂₂ and `sources` r₁, r₂, as above."""
+    count, length = len(entries[0][0]), entries[0][1].shape[2]
+    turns, ambiguous, ends = np.empty(count, np.int64), np.empty(count, np.bool_), np.empty((2, count))
+    m_re, m_im = np.empty((4, length)), np.empty((4, length))
+    d_re, d_im = np.empty(length), np.empty(length)
+    r_re, r_im = np.empty((2, length)), np.empty((2, length))
+    z_re, z_im = np.empty(length), np.empty(length)
+    for i in range(count):
+        for e in range(4):
+            c, re, im = entries[e]
+            shared = min(i, re.shape[0] - 1)
+            _sum(c[i], re[shared], im[shared], m_re[e], m_im[e])
+        for n in range(length):
+            d_re[n] = m_re[0, n] * m_re[3, n] - m_im[0, n] * m_im[3, n]
+            d_re[n] -= m_re[1, n] * m_re[2, n] - m_im[1, n] * m_im[2, n]
+            d_im[n] = m_re[0, n] * m_im[3, n] + m_im[0, n] * m_re[3, n]
+            d_im[n] -= m_re[1, n] * m_im[2, n] + m_im[1, n] * m_re[2, n]
+        turns[i], ambiguous[i] = _turns(d_re, d_im)
+        ends[0, i], ends[1, i] = d_re[0], d_re[length - 1]
+        for n in range(2 * nodes + 1):
+            scale = 1.0 / (d_re[n] * d_re[n] + d_im[n] * d_im[n])
+            d_re[n] *= scale
+            d_im[n] *= -scale
+        for k in range(len(sources[0][0])):
+            for row in range(2):
+                s, s_re, s_im = sources[row]
+                own = min(i, s_re.shape[0] - 1)
+                _sum(s[k, i], s_re[own], s_im[own], r_re[row], r_im[row])
+            for row in range(2):
+                plus, minus = 3 - 3 * row, 1 + row
+                other = 1 - row
+                for n in range(2 * nodes + 1):
+                    x = m_re[plus, n] * r_re[row, n] - m_im[plus, n] * r_im[row, n]
+                    x -= m_re[minus, n] * r_re[other, n] - m_im[minus, n] * r_im[other, n]
+                    y = m_re[plus, n] * r_im[row, n] + m_im[plus, n] * r_re[row, n]
+                    y -= m_re[minus, n] * r_im[other, n] + m_im[minus, n] * r_re[other, n]
+                    z_re[n] = x * d_re[n] - y * d_im[n]
+                    z_im[n] = x * d_im[n] + y * d_re[n]
+                _split(z_re, z_im, nodes, odd[row, k, i], even[row, k, i])
+    return turns, ambiguous, ends
+
+
+def solve(entries: Any, sources: Any, nodes: int, odd: Floats, even: Floats) -> Trace:
+    """Solve one or two coordinates; see `solve_scalar` and `solve_pair`."""
+    if len(sources) == 1:
+        result: Trace = solve_scalar(entries[0], sources[0], nodes, odd, even)
+    else:
+        result = solve_pair(entries, sources, nodes, odd, even)
+    return result
+
+
+def trace(entries: Any) -> Trace:
+    """Return the trace of the determinant of one or two coordinates along a path."""
+    size = 1 if len(entries) == 1 else 2
+    count = len(entries[0][0])
+    nothing = (np.zeros((0, count, 1)), np.zeros((1, 1, 1)), np.zeros((1, 1, 1)))
+    return solve(entries, (nothing,) * size, 0, np.zeros((size, 0, count, 0)), np.zeros((size, 0, count, 2)))
