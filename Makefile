@@ -8,7 +8,7 @@ BIN := $(VENV)/bin
 export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
 
-.PHONY: demo test test-slow lint format reproduce docs clean
+.PHONY: demo test test-slow lint format bench reproduce docs clean
 
 demo: $(VENV)/installed
 	$(BIN)/fracctl run experiment=ic1_outofplane
@@ -27,6 +27,9 @@ lint: $(VENV)/installed-test
 format: $(VENV)/installed-test
 	$(BIN)/ruff check --fix
 	$(BIN)/ruff format
+
+bench: $(VENV)/installed
+	$(BIN)/python benchmarks/survey_rate.py
 
 reproduce: $(VENV)/installed
 	$(BIN)/fracctl run experiment=outofplane

@@ -138,6 +138,20 @@ def test_commands_of_the_readme_are_valid(command: list[str], capsys: pytest.Cap
     assert main([word for word in command if word != "--json"] + compose_only) == 0, capsys.readouterr().err
 
 
+@pytest.mark.slow
+def test_the_first_run_prints_what_the_readme_prints(tmp_path: Path) -> None:
+    (shown,) = re.findall(r"```console\n\$ make demo\n(.*?)…", README, flags=re.DOTALL)
+    program = [sys.executable, "-c", "import sys; from fracctl.cli.main import main; sys.exit(main())"]
+    command = [*program, "run", "experiment=ic1_outofplane", f"output_dir={tmp_path}"]
+    printed = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    assert printed.startswith(shown)
+    run_directory = Path(printed.splitlines()[-1])
+    assert run_directory.parent == tmp_path / "ic1_outofplane"
+    named = set(re.findall(r"`([\w.]+\.(?:json|parquet|log|sha256))`", README))
+    assert named <= {path.name for path in run_directory.iterdir()}
+    assert {path.suffix for path in (run_directory / "figures").iterdir()} == {".pdf", ".png", ".csv"}
+
+
 def test_documents_name_files_that_exist() -> None:
     for name in ("README.md", "CONTRIBUTING.md"):
         text = (ROOT / name).read_text(encoding="utf-8")
