@@ -21,5 +21,7 @@ def run(experiment: str, overrides: Sequence[str] = (), *, config_dir: str | Pat
         ConfigurationError: a key is unknown or a value out of range.
         RunError: the run could not be computed or stored.
     """
-    arguments = [f"experiment={experiment}", "scheduler=serial", *overrides]
+    chosen = any(word.lstrip("+").startswith(("scheduler=", "scheduler@")) for word in overrides)
+    default = [] if chosen else ["scheduler=serial"]
+    arguments = [f"experiment={experiment}", *default, *overrides]
     return execute(compose(arguments, None if config_dir is None else Path(config_dir)))

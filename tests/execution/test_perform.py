@@ -163,6 +163,18 @@ def test_fresh_computes_again_in_the_same_place(tmp_path: Path, undisturbed: Pat
     assert tables_of(again.run_directory) == tables_of(undisturbed)
 
 
+def test_fresh_keeps_the_stored_run_until_it_is_done(tmp_path: Path, undisturbed: Path) -> None:
+    first = perform(job(tmp_path)).run_directory
+    with pytest.raises(KeyboardInterrupt):
+        perform(job(tmp_path), fresh=True, progress=Watch(interrupt_after=1))
+    aside = first.with_name(f".{first.name}.old")
+    assert tables_of(aside) == tables_of(undisturbed)
+    again = perform(job(tmp_path))
+    assert not again.reused
+    assert list(first.parent.iterdir()) == [first]
+    assert tables_of(first) == tables_of(undisturbed)
+
+
 def test_a_damaged_run_is_computed_again_with_a_note(tmp_path: Path, undisturbed: Path) -> None:
     first = perform(job(tmp_path))
     path = first.run_directory / "evaluations.parquet"

@@ -51,6 +51,13 @@ def test_tables_are_bitwise_equal_for_any_scheduler(tmp_path: Path) -> None:
     assert tables[0] == tables[2]
 
 
+def test_overrides_may_choose_the_scheduler(tmp_path: Path) -> None:
+    axes = ["survey.axes.alpha_w=1.0", "survey.axes.k_p_w=[0.5,1.0]", "survey.axes.k_d_w=[1.0,2.0]"]
+    words = [*axes, "figures=[]", f"output_dir={tmp_path}", "scheduler=local", "scheduler.workers=2"]
+    run = RunDirectory(fracctl.run("ic1_outofplane", words).run_directory)
+    assert run.run_json["configuration"]["scheduler"] == {"type": "local", "workers": 2}
+
+
 def test_trajectories_are_those_of_the_optima(result: RunResult) -> None:
     trajectories = RunDirectory(result.run_directory).trajectories()
     assert list(trajectories) == ["run", "time", "w", "w_dot", "control_w"]
