@@ -27,7 +27,7 @@ _log = logging.getLogger(__name__)
 class Parts:
     """The parts in a directory.
 
-    A part is trusted if its SHA-256 is the one that was noted when it was written and every page has its checksum.
+    A part is trusted if its SHA-256 is the one that was noted before it was written and every page has its checksum.
 
     Args:
         directory: created if it is not there.
@@ -49,8 +49,8 @@ class Parts:
         """Write the rows of a block; `failed` says why the block could not be computed."""
         metadata = dict(self._schema.metadata or {}) | ({_FAILED: failed.encode()} if failed else {})
         content = tables.serialise(columns.to_table(rows, self._schema).replace_schema_metadata(metadata))
-        write_bytes(self._path(number), content)
         self._note(number, hashlib.sha256(content).hexdigest())
+        write_bytes(self._path(number), content)
 
     def load(self, number: int) -> dict[str, Array] | None:
         """Return the rows of a block; None where they are still to be computed, or to be tried again."""
@@ -83,7 +83,7 @@ class Parts:
     def _verified(self, path: Path) -> pa.Table:
         content = path.read_bytes()
         if hashlib.sha256(content).hexdigest() != self._digests.get(path.name):
-            raise ValueError("its SHA-256 is not the one noted when it was written")
+            raise ValueError("its SHA-256 is not the one noted for it")
         table = tables.deserialise(content)
         if not table.schema.equals(self._schema, check_metadata=False):
             raise ValueError("its columns are not those of this run")
