@@ -1,11 +1,12 @@
 """Reference trajectories: numerical inverse Laplace transform with the poles taken out, to any number of digits.
 
-    M(σ) Ξ = σ ξ₀ + ξ₀' - D ξ₀ + K_D diag(σ^(α-1)) ξ₀,    Υ = -K_P Ξ - K_D (diag(σ^α) Ξ - diag(σ^(α-1)) ξ₀)
+    M(σ) R = σ ξ₀' + (S - K_P) ξ₀,    Ξ = (R + ξ₀)/σ,    Υ = -K_P Ξ - K_D diag(σ^(α-1)) R
 
-Principal-sheet poles p and residues c are known (`tests.references.poles`, their number proved), so the transform
-Ξ - Σ c/(σ - p) is analytic off the cut; it is inverted by the midpoint rule on the hyperbola
-σ = μ (1 + sin(iu - φ)), μ = κ/T, which depends on the time window [T/4, T] alone, and Σ c e^(p t) is added. No contour
-has to enclose a pole, so none can be wrong. The integral ∫₀ˢ υ has the transform Υ/σ.
+R is the transform of ξ', in which no initial value cancels for large σ. Principal-sheet poles p and residues c are
+known (`tests.references.poles`, their number proved), so the transform Ξ - Σ c/(σ - p) is analytic off the cut; it is
+inverted by the midpoint rule on the hyperbola σ = μ (1 + sin(iu - φ)), μ = κ/T, which depends on the time window
+[T/4, T] alone, and Σ c e^(p t) is added. No contour has to enclose a pole, so none can be wrong. The integral ∫₀ˢ υ
+has the transform Υ/σ.
 
 Origin: Weideman and Trefethen, Math. Comp. 76 (2007) 1341, for the hyperbola; node spacing and range here follow from
 the strip of analyticity |φ| < π/4 and the wanted digits, not from their optimum. Tolerance: 10^-digits of the peak.
@@ -66,41 +67,35 @@ def _solve(entries: list[list[Any]], right: Sequence[Any]) -> tuple[list[Any], A
     return [d * right[0] - b * right[1], a * right[1] - c * right[0]], a * d - b * c
 
 
-def _right_hand_side(loop: Loop, sigma: Any, powers: list[Any]) -> list[Any]:
+def _right_hand_side(loop: Loop, sigma: Any) -> list[Any]:
+    """Return σ ξ₀' + (S - K_P) ξ₀."""
     m = range(loop.size)
     value, rate = [float(x) for x in loop.value], [float(x) for x in loop.rate]
-    right = []
-    for i in m:
-        memory = sum((float(loop.k_d[i, j]) * powers[j] / sigma - float(loop.damping[i, j])) * value[j] for j in m)
-        right.append(sigma * value[i] + rate[i] + memory)
-    return right
+    stiffness, k_p = loop.stiffness.tolist(), loop.k_p.tolist()
+    one = sigma / sigma
+    return [sigma * rate[i] + sum((one * stiffness[i][j] - k_p[i][j]) * value[j] for j in m) for i in m]
 
 
-def _feedback(loop: Loop, powers: list[Any], position: list[Any]) -> list[Any]:
-    """Return -(K_P + K_D diag(σ^α)) Ξ."""
+def _from_rate(loop: Loop, sigma: Any, powers: list[Any], rate: list[Any], value: list[float]) -> list[Any]:
+    """Return Ξ, R, Υ, Υ/σ for R and ξ₀ (or, for residues, 0 in its place)."""
     m = range(loop.size)
-    return [-sum((float(loop.k_p[i, j]) + float(loop.k_d[i, j]) * powers[j]) * position[j] for j in m) for i in m]
+    k_p, k_d = loop.k_p.tolist(), loop.k_d.tolist()
+    position = [(rate[i] + value[i]) / sigma for i in m]
+    control = [-sum(k_p[i][j] * position[j] + k_d[i][j] * (powers[j] / sigma) * rate[j] for j in m) for i in m]
+    return [*position, *rate, *control, *[x / sigma for x in control]]
 
 
 def transforms(loop: Loop, sigma: Any, powers: list[Any]) -> list[Any]:
     """Return the transforms of ξ, ξ', υ, ∫υ (4m of them) at σ; a mpmath number or an array of nodes."""
-    m = range(loop.size)
-    right = _right_hand_side(loop, sigma, powers)
-    numerator, det = _solve(poles.matrix_entries(loop, sigma, powers), right)
-    position = [x / det for x in numerator]
-    rate = [sigma * position[i] - float(loop.value[i]) for i in m]
-    memory = [sum(float(loop.k_d[i, j]) * powers[j] / sigma * float(loop.value[j]) for j in m) for i in m]
-    control = [f + g for f, g in zip(_feedback(loop, powers, position), memory, strict=True)]
-    return [*position, *rate, *control, *[x / sigma for x in control]]
+    numerator, det = _solve(poles.matrix_entries(loop, sigma, powers), _right_hand_side(loop, sigma))
+    return _from_rate(loop, sigma, powers, [x / det for x in numerator], loop.value.tolist())
 
 
 def residues(loop: Loop, pole: Any, powers: list[Any]) -> list[Any]:
     """Return the residues of `transforms` at a simple pole."""
-    numerator, _ = _solve(poles.matrix_entries(loop, pole, powers), _right_hand_side(loop, pole, powers))
+    numerator, _ = _solve(poles.matrix_entries(loop, pole, powers), _right_hand_side(loop, pole))
     slope = poles.determinant_slope(loop, pole, powers)
-    position = [x / slope for x in numerator]
-    control = _feedback(loop, powers, position)
-    return [*position, *[pole * x for x in position], *control, *[x / pole for x in control]]
+    return _from_rate(loop, pole, powers, [x / slope for x in numerator], [0.0] * loop.size)
 
 
 def window_of(time: float) -> int:

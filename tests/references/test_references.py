@@ -34,8 +34,7 @@ def test_contour_and_power_series_agree_out_of_plane(loop: loops.Loop, time: flo
         assert abs(Reference(loop, 25).at(time)[0] - series_value) < 1e-25
 
 
-@pytest.mark.parametrize("loop", IN_PLANE)
-@pytest.mark.parametrize("time", [0.05, 0.4])
+@pytest.mark.parametrize(("loop", "time"), [(IN_PLANE[0], 0.05), *((loop, 0.4) for loop in IN_PLANE[::2])])
 def test_contour_and_power_series_agree_in_plane(loop: loops.Loop, time: float) -> None:
     series_value = series.power_series(loop, time, digits=24)
     computed = Reference(loop, 22).at(time)
@@ -108,7 +107,7 @@ def test_free_motion_is_the_matrix_exponential() -> None:
 
 @pytest.mark.parametrize("loop", [*OUT_OF_PLANE, *IN_PLANE])
 def test_double_precision_references_keep_eleven_digits(loop: loops.Loop) -> None:
-    times = [1e-4, 0.03, 1.0, 7.0, 12.0, 37.0]
+    times = [1e-7, 1e-4, 0.03, 1.0, 7.0, 12.0, 37.0]
     reference = Reference(loop, 20)
     exact, fast, quickest = reference.digits_at(times), reference(times), QuickReference(loop)(times)
     for name in ("position", "rate", "control", "impulse"):

@@ -257,6 +257,38 @@ def test_published_loop_through_the_library_call() -> None:
     assert float(trajectory([3.0])[0, 0]) == pytest.approx(float(exact), abs=1e-8 * 0.0007)
 
 
+@pytest.mark.parametrize(
+    ("member", "horizon"),
+    [
+        (OUT_OF_PLANE[0], 1e-6),
+        (IN_PLANE[0], 1e-6),
+        (IN_PLANE[0], 1e-2),
+        (IN_PLANE[0], 40.0 * np.pi),
+        (OUT_OF_PLANE[0], 200.0 * np.pi),
+    ],
+)
+def test_short_and_long_horizons(member: Loop, horizon: float) -> None:
+    trajectory = solve_batch([member], horizon)
+    times = horizon * np.sort(np.concatenate([np.geomspace(1e-6, 1.0, 8), np.linspace(0.05, 0.95, 11)]))
+    exact = Reference(member, 18)(times)
+    position, control = trajectory(times)[0, :, : member.size], trajectory.control(times)[0]
+    assert np.abs(position - exact.position).max() < 1e-8 * np.abs(exact.position).max()
+    assert np.abs(control - exact.control).max() < 1e-8 * np.abs(exact.control).max()
+
+
+@pytest.mark.parametrize("alpha", [1.0, 0.9])
+def test_a_free_mass(alpha: float) -> None:
+    """k_P = -1 and k_D = 0 leave w'' = 0; k_D > 0 a Mittag-Leffler function with a pole at σ = 0."""
+    times = np.array([0.1, 1.0, 9.0])
+    trajectory = Contour().solve(ClosedLoop(HCWOutOfPlane(), PDAlpha(-1.0, 0.0, alpha)), np.array([1e-3, 2e-3]), 10.0)
+    np.testing.assert_allclose(trajectory(times)[:, 0], 1e-3 + 2e-3 * times, rtol=1e-8)
+    assert trajectory.stable.item() is None
+    trajectory = Contour().solve(ClosedLoop(HCWOutOfPlane(), PDAlpha(-1.0, 1.5, alpha)), np.array([1e-3, 2e-3]), 10.0)
+    exact = [float(series.damped_free_mass(1.5, alpha, 1e-3, 2e-3, t)) for t in times]
+    np.testing.assert_allclose(trajectory(times)[:, 0], exact, rtol=1e-7)
+    assert trajectory.stable.item() is None
+
+
 @pytest.mark.parametrize("tolerance", [0.0, -1e-8, 1.0, np.nan])
 def test_tolerances_out_of_range_are_refused(tolerance: float) -> None:
     with pytest.raises(ArgumentError, match="`tolerance` must"):

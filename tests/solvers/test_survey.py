@@ -111,3 +111,11 @@ def test_grid_rows_are_right_where_they_are_not_optimal() -> None:
             assert table["settling_time"][k, i] == pytest.approx(reference.settling_time(), rel=1e-6)
             assert table["overshoot"][k, i] == pytest.approx(reference.overshoot(), rel=1e-6)
             assert table["control_effort"][k, i] == pytest.approx(reference.control_effort(), rel=1e-7)
+
+
+def test_one_hopeless_member_does_not_spoil_a_survey() -> None:
+    """A gain so high that its oscillations cannot be resolved is a flagged row; its neighbours are solved."""
+    loop = ClosedLoop(HCWOutOfPlane(), PDAlpha([0.85, 1e8, 0.55], [2.0, 0.01, 2.0], 0.91))
+    table = surveyed(loop, np.array([[0.0, 0.002]]))
+    assert list(table["status"][0]) == ["ok", "failed", "ok"]
+    assert table["settling_time"][0, 0] == pytest.approx(3.01276, abs=5.1e-6)

@@ -2,35 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import pytest
 
-from fracctl.controllers import LinearLawTerms, PDAlpha
+from fracctl.controllers import PDAlpha
 from fracctl.errors import ArgumentError
 from fracctl.fractional.system import LinearFractionalSystem
 from fracctl.fractional.terms import FractionalTerm, powers
 from fracctl.loop import ClosedLoop
 from fracctl.plants import HCWInPlane, HCWOutOfPlane, LinearPlant
 from tests.references import loops, poles
-
-
-@dataclass(frozen=True)
-class Lag:
-    """υ = -k_P w - k_D z, T z' = w' - z: PD with a lag in its derivative, one auxiliary state."""
-
-    k_p: float
-    k_d: float
-    time: float
-
-    def linear_terms(self, n_controls: int) -> LinearLawTerms:
-        control = (FractionalTerm(np.array([[-self.k_p, -self.k_d]]), np.zeros(2)),)
-        auxiliary = (
-            FractionalTerm(np.array([[1.0 / self.time, 0.0]]), np.array([1.0, 0.0])),
-            FractionalTerm(np.array([[0.0, -1.0 / self.time]]), np.zeros(2)),
-        )
-        return LinearLawTerms(control, auxiliary, np.zeros(1))
+from tests.systems.laws import Lag
 
 
 def matrix_at(system: LinearFractionalSystem, sigma: complex, member: int = 0) -> np.ndarray:
