@@ -109,7 +109,8 @@ class Scheduler:
             raise RunError("the survey is not finished, but has no further points to evaluate")
         done, _ = wait(self._pending, return_when=FIRST_COMPLETED)
         for future in sorted(done, key=lambda one: self._pending[one].number):
-            self._take(self._pending.pop(future), future)
+            self._take(self._pending[future], future)
+            del self._pending[future]
 
     def _take(self, block: Block, future: Future[Outcome]) -> None:
         try:
