@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from fracctl.cli import output
 from fracctl.cli.failure import report, sentence
 from fracctl.cli.parser import Parser
+from fracctl.cli.table import ResultTable
 from fracctl.errors import ConfigurationError, FracctlError
 
 if TYPE_CHECKING:
@@ -35,6 +36,9 @@ _EXAMPLES = """\
   fracctl run -m experiment=ic1_outofplane,ic2_outofplane --json  two runs, a line of JSON each
   fracctl run experiment=outofplane --cfg job                     print the configuration only"""
 
+
+MOST_DESIGN_VARIABLES = 10
+"""Of a law with more parameters, the table shows those that the survey varies."""
 
 _KEYS = (
     *("experiment", "run_id", "run_directory", "status", "reused"),
@@ -140,15 +144,21 @@ def _show(summary: dict[str, Any], job: _Job, options: argparse.Namespace) -> No
     if options.json:
         output.say(_json(summary))
         return
-    from fracctl.cli.table import result_table
-
     stored = ", stored already" if summary.get("reused") else ""
     output.say(f"{summary['experiment']}{stored}")
-    for line in result_table(summary, job.config.objectives):
+    for line in _table(job.config).lines(summary):
         output.say(line)
     for note in () if options.quiet else summary.get("notes") or ():
         output.say(f"note: {note}")
     output.say(str(summary["run_directory"]))
+
+
+def _table(config: RunConfig) -> ResultTable:
+    """A table without the many gains of a large plant that the survey leaves alone."""
+    survey, controller = config.survey.model_dump(), config.controller.model_dump(exclude={"type"})
+    unvaried = [name for name in controller if name not in survey.get("axes", {})]
+    hidden = unvaried if len(controller) > MOST_DESIGN_VARIABLES else []
+    return ResultTable(config.objectives, hidden, "result" if survey["type"] == "single" else "optimum")
 
 
 def _report(failures: Sequence[tuple[_Job, Exception]], options: argparse.Namespace, several: bool) -> int:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 TURN = 2.0 * math.pi
@@ -22,16 +23,43 @@ def table(rows: Sequence[Sequence[str]], indent: str = "  ") -> list[str]:
     ]
 
 
-def result_table(summary: Mapping[str, Any], objectives: Mapping[str, Sequence[str]]) -> list[str]:
-    """Return the optimum and the baseline of every objective and initial condition of a run's summary."""
-    results = summary.get("optima") or [summary]
-    lines = []
-    for name in dict.fromkeys(result.get("objective_name") for result in results):
-        of_name = [result for result in results if result.get("objective_name") == name]
-        factors = objectives.get(str(name), ())
-        lines.append(_title(name, factors))
-        lines += table([row for result in of_name for row in _rows(result, name, factors, result is of_name[0])])
-    return lines
+@dataclass(frozen=True)
+class ResultTable:
+    """The optimum and the baseline of every objective and initial condition, from a run's summary."""
+
+    objectives: Mapping[str, Sequence[str]]
+    """Columns of which each objective is the geometric mean."""
+    hidden: Collection[str] = ()
+    """Columns that are not shown."""
+    best: str = "optimum"
+    """What the optimum is called."""
+
+    def lines(self, summary: Mapping[str, Any]) -> list[str]:
+        """Return the table, one part for each objective."""
+        results = summary.get("optima") or [summary]
+        lines = []
+        for name in dict.fromkeys(result.get("objective_name") for result in results):
+            of_name = [result for result in results if result.get("objective_name") == name]
+            lines.append(_title(name, self.objectives.get(str(name), ())))
+            lines += table([row for result in of_name for row in self._rows(result, name, result is of_name[0])])
+        return lines
+
+    def _rows(self, result: Mapping[str, Any], name: str | None, first: bool) -> Iterator[list[str]]:
+        optimum, baseline, change = result["optimum"], result["baseline"], result["change_percent"]
+        condition = str(result.get("initial_condition") or (optimum or {}).get("initial_condition") or "")
+        if optimum is None:
+            yield [condition, f"no {self.best}"]
+            return
+        columns = [column for column in _columns(optimum) if column not in self.hidden]
+        columns += [f"objective_{name}"] if len(self.objectives.get(str(name), ())) > 1 else []
+        if first:
+            yield ["", "", *[heading for column in columns for heading in _heading(column, name)]]
+        for label, values in ((self.best, optimum), ("baseline", baseline)):
+            if values is not None:
+                shown = [cell for column in columns for cell in _cells(column, values.get(column))]
+                yield [condition if values is optimum else "", label, *shown]
+        if change is not None:
+            yield ["", "change", f"{change:+.1f} %"]
 
 
 def number(value: Any, digits: int = 6) -> str:
@@ -52,23 +80,6 @@ def _title(name: str | None, factors: Sequence[str]) -> str:
     if name is None or len(factors) < 2:
         return str(name or "result")
     return f"{name} = ({' · '.join(factors)})^(1/{len(factors)})"
-
-
-def _rows(result: Mapping[str, Any], name: str | None, factors: Sequence[str], first: bool) -> Iterator[list[str]]:
-    optimum, baseline, change = result["optimum"], result["baseline"], result["change_percent"]
-    condition = str(result.get("initial_condition") or (optimum or {}).get("initial_condition") or "")
-    if optimum is None:
-        yield [condition, "no optimum"]
-        return
-    columns = _columns(optimum) + ([f"objective_{name}"] if len(factors) > 1 else [])
-    if first:
-        yield ["", "", *[heading for column in columns for heading in _heading(column, name)]]
-    for label, values in (("optimum", optimum), ("baseline", baseline)):
-        if values is not None:
-            shown = [cell for column in columns for cell in _cells(column, values.get(column))]
-            yield [condition if label == "optimum" else "", label, *shown]
-    if change is not None:
-        yield ["", "change", f"{change:+.1f} %"]
 
 
 def _columns(row: Mapping[str, Any]) -> list[str]:

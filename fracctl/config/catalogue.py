@@ -39,7 +39,7 @@ class Catalogue:
     def summary(self, group: str, option: str) -> str:
         """What the comment at the head of a file says; for an experiment, without the command that runs it."""
         path = self.file(f"{group}/{option}")
-        lines = path.read_text(encoding="utf-8").splitlines() if path else []
+        lines = path.read_text(encoding="utf-8", errors="replace").splitlines() if path else []
         comment = []
         for line in lines:
             if not line.startswith("#"):

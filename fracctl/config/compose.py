@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -38,6 +39,7 @@ MOST_JOBS = 10_000
 """More runs than this on one command line are a survey written as a sweep."""
 
 _PRIMARY = "config"
+_QUOTED = re.compile(r"'[^']*'")
 
 
 def compose(overrides: Sequence[str], config_dir: Path | None = None) -> RunConfig:
@@ -192,11 +194,13 @@ def _reason(error: Exception) -> str:
         cause = cause.__cause__
     lines = [line.strip() for line in str(cause).splitlines() if line.strip()]
     if lines and lines[0].startswith("Could not delete"):
-        return f"there is no key '{lines[0].split(chr(39))[1]}' to remove"
+        return f"there is no key {_QUOTED.findall(lines[0])[0]} to remove"
     if lines and lines[0].startswith("Error merging override"):
         word = lines[0].partition("++")[2]
         cure = f"set its keys one by one, {word.partition('=')[0]}.KEY=VALUE"
         return f"cannot set '{word}': a mapping stays a mapping; {cure}"
+    if lines and lines[0].startswith("Could not override"):
+        return f"the defaults of {_PRIMARY}.yaml have no group {_QUOTED.findall(lines[0])[0]}"
     detail = f" ({_first_line(cause.__cause__)})" if isinstance(cause.__cause__, Exception) else ""
     return (lines[0] if lines else type(error).__name__) + detail
 

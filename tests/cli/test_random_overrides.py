@@ -45,7 +45,7 @@ assignments = st.builds(
 words = st.one_of(st.sampled_from(CHOICES), assignments, keys.map(lambda key: f"~{key}"), st.text(max_size=10))
 
 
-@settings(max_examples=150)
+@settings(max_examples=100)
 @given(st.lists(words, max_size=4))
 def test_validate_never_shows_a_traceback(overrides: list[str]) -> None:
     with pytest.MonkeyPatch.context() as patch:
@@ -58,7 +58,7 @@ def test_validate_never_shows_a_traceback(overrides: list[str]) -> None:
     assert text.startswith("valid: " if code == 0 else "error: "), (overrides, text)
 
 
-@settings(max_examples=50)
+@settings(max_examples=30)
 @given(st.lists(words, max_size=3))
 def test_a_sweep_is_refused_or_expanded(overrides: list[str]) -> None:
     with pytest.MonkeyPatch.context() as patch:

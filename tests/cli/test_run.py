@@ -83,9 +83,15 @@ def test_several_objectives_and_initial_conditions(capsys: pytest.CaptureFixture
     assert main(["run"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[1] == "settling_time"
-    assert lines[4].split() == ["ic2", "no", "optimum"]
+    assert lines[4].split() == ["ic2", "no", "result"]
     assert lines[5] == "st_os_u = (settling_time · overshoot · control_effort)^(1/3)"
     assert lines[7].split()[-1] == "0.395"
+
+
+def test_many_gains_that_do_not_vary_are_not_shown(capsys: pytest.CaptureFixture[str], stand_in: StandIn) -> None:
+    assert main(["run", "plant=hcw", "controller=pd_alpha_full"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[2].split() == ["settling_time", "overshoot", "control_effort"]
 
 
 def test_notes_follow_the_table(capsys: pytest.CaptureFixture[str], stand_in: StandIn) -> None:
