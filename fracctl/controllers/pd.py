@@ -34,5 +34,6 @@ class PD(PDAlpha):
     @classmethod
     def from_parameters(cls, components: Sequence[str], values: Mapping[str, ArrayLike]) -> PD:
         """Build the law from numbers or arrays (b,) by parameter name; missing ones take their defaults."""
-        gains = PDAlpha.from_parameters(components, {p.name: values[p.name] for p in cls.parameters(components) if p.name in values})
-        return cls(gains.k_p, gains.k_d)
+        names = [parameter.name for parameter in cls.parameters(components)]
+        law = PDAlpha.from_parameters(components, {name: values[name] for name in names if name in values})
+        return cls(law.k_p, law.k_d)
