@@ -224,7 +224,8 @@ def test_trajectories_begin_at_their_initial_values() -> None:
 
 
 def test_no_motion_from_rest() -> None:
-    trajectory = Contour().solve(ClosedLoop(HCWInPlane(), PDAlpha(np.eye(2), np.eye(2), 0.9)), np.zeros(4), 5.0)
+    loop = ClosedLoop(HCWInPlane(), PDAlpha(4.0 * np.eye(2), 2.0 * np.eye(2), 0.9))
+    trajectory = Contour().solve(loop, np.zeros(4), 5.0)
     assert not trajectory.states.any()
     assert not trajectory.controls.any()
     assert trajectory.status.item() == "ok"
