@@ -62,7 +62,7 @@ class ClosedLoop:
     def initial_values(self, initial_state: Floats) -> tuple[Floats, Floats]:
         """Split states (…, 2m) or (…, 2m+q) into y(0) and y'(0), (…, m+q); y' of auxiliary states is not needed."""
         m, q = self.system.n_positions, self.system.n_auxiliary
-        if initial_state.shape[-1] not in (2 * m, 2 * m + q) or initial_state.ndim not in (1, 2):
+        if initial_state.ndim not in (1, 2) or initial_state.shape[-1] not in (2 * m, 2 * m + q):
             allowed = f"must have shape ({2 * m},) or (b, {2 * m})"
             raise ArgumentError("initial_state", f"of shape {initial_state.shape}", allowed)
         lead = initial_state.shape[:-1]

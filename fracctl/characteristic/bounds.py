@@ -7,6 +7,9 @@ import numpy as np
 from fracctl.arrays import Floats
 from fracctl.characteristic.matrix import CharacteristicMatrix
 
+SMALLEST_RADIUS = 1e-2
+"""Least bound that is returned, also for loops whose poles all lie at the origin."""
+
 
 def pole_radius(matrix: CharacteristicMatrix) -> Floats:
     """Return R (b,) such that every zero of det M̃ off the cut has |σ| < R.
@@ -16,7 +19,7 @@ def pole_radius(matrix: CharacteristicMatrix) -> Floats:
     the same with column sums where that is smaller.
     """
     radius = np.ones(matrix.batch)
-    low, high = np.full(matrix.batch, 1e-6), np.ones(matrix.batch)
+    low, high = np.full(matrix.batch, SMALLEST_RADIUS), np.ones(matrix.batch)
     while np.any(grows := _norm(matrix, high) > 1.0):
         low, high = np.where(grows, high, low), np.where(grows, 2.0 * high, high)
     for _ in range(12):

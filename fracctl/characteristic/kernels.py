@@ -17,6 +17,9 @@ from fracctl.arrays import Array, Booleans, Floats
 Trace = tuple[Array, Booleans, Floats]
 """Turns of det M̃ along a path (b,), whether a step was ambiguous (b,), real parts at the first and last node (2, b)."""
 
+LARGEST_CHANGE = 0.5
+"""Change of a function over a step, relative to its size at both ends, beyond which the step is doubtful."""
+
 compiled = numba.njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
 
 
@@ -95,6 +98,20 @@ def _split(re: Floats, im: Floats, nodes: int, odd: Floats, even: Floats) -> Non
 
 
 @compiled
+def _determinant(entries: Any, i: int, m_re: Floats, m_im: Floats, d_re: Floats, d_im: Floats) -> None:
+    """Fill in the four entries (4, P) and the determinant (P,) of member i."""
+    for e in range(4):
+        c, re, im = entries[e]
+        shared = min(i, re.shape[0] - 1)
+        _sum(c[i], re[shared], im[shared], m_re[e], m_im[e])
+    for n in range(len(d_re)):
+        d_re[n] = m_re[0, n] * m_re[3, n] - m_im[0, n] * m_im[3, n]
+        d_re[n] -= m_re[1, n] * m_re[2, n] - m_im[1, n] * m_im[2, n]
+        d_im[n] = m_re[0, n] * m_im[3, n] + m_im[0, n] * m_re[3, n]
+        d_im[n] -= m_re[1, n] * m_im[2, n] + m_im[1, n] * m_re[2, n]
+
+
+@compiled
 def solve_pair(entries: Any, sources: Any, nodes: int, odd: Floats, even: Floats) -> Trace:
     """Solve M̃ Z̃ = r for two coordinates; `entries` holds M̃₁₁, M̃₁₂, M̃₂₁, M̃₂₂ and `sources` r₁, r₂, as above."""
     count, length = len(entries[0][0]), entries[0][1].shape[2]
@@ -104,15 +121,7 @@ def solve_pair(entries: Any, sources: Any, nodes: int, odd: Floats, even: Floats
     r_re, r_im = np.empty((2, length)), np.empty((2, length))
     z_re, z_im = np.empty(length), np.empty(length)
     for i in range(count):
-        for e in range(4):
-            c, re, im = entries[e]
-            shared = min(i, re.shape[0] - 1)
-            _sum(c[i], re[shared], im[shared], m_re[e], m_im[e])
-        for n in range(length):
-            d_re[n] = m_re[0, n] * m_re[3, n] - m_im[0, n] * m_im[3, n]
-            d_re[n] -= m_re[1, n] * m_re[2, n] - m_im[1, n] * m_im[2, n]
-            d_im[n] = m_re[0, n] * m_im[3, n] + m_im[0, n] * m_re[3, n]
-            d_im[n] -= m_re[1, n] * m_im[2, n] + m_im[1, n] * m_re[2, n]
+        _determinant(entries, i, m_re, m_im, d_re, d_im)
         turns[i], ambiguous[i] = _turns(d_re, d_im)
         ends[0, i], ends[1, i] = d_re[0], d_re[length - 1]
         for n in range(2 * nodes + 1):
@@ -147,9 +156,56 @@ def solve(entries: Any, sources: Any, nodes: int, odd: Floats, even: Floats) -> 
     return result
 
 
-def trace(entries: Any) -> Trace:
-    """Return the trace of the determinant of one or two coordinates along a path."""
-    size = 1 if len(entries) == 1 else 2
-    count = len(entries[0][0])
-    nothing = (np.zeros((0, count, 1)), np.zeros((1, 1, 1)), np.zeros((1, 1, 1)))
-    return solve(entries, (nothing,) * size, 0, np.zeros((size, 0, count, 0)), np.zeros((size, 0, count, 2)))
+def follow(entries: Any, factor_re: Floats, factor_im: Floats) -> tuple[Array, Booleans, Floats]:
+    """Return turns of a determinant times a factor along a path, whether a step is doubtful, its last real part."""
+    result: tuple[Array, Booleans, Floats] = (
+        _follow_scalar(entries[0], factor_re, factor_im)
+        if len(entries) == 1
+        else _follow_pair(entries, factor_re, factor_im)
+    )
+    return result
+
+
+@compiled
+def _follow_scalar(entry: Any, factor_re: Floats, factor_im: Floats) -> tuple[Array, Booleans, Floats]:
+    c, re, im = entry
+    count, length = len(c), len(factor_re)
+    turns, doubtful, last = np.empty(count, np.int64), np.empty(count, np.bool_), np.empty(count)
+    d_re, d_im = np.empty(length), np.empty(length)
+    for i in range(count):
+        shared = min(i, re.shape[0] - 1)
+        _sum(c[i], re[shared], im[shared], d_re, d_im)
+        turns[i], doubtful[i], last[i] = _followed(d_re, d_im, factor_re, factor_im)
+    return turns, doubtful, last
+
+
+@compiled
+def _follow_pair(entries: Any, factor_re: Floats, factor_im: Floats) -> tuple[Array, Booleans, Floats]:
+    count, length = len(entries[0][0]), len(factor_re)
+    turns, doubtful, last = np.empty(count, np.int64), np.empty(count, np.bool_), np.empty(count)
+    m_re, m_im, d_re, d_im = np.empty((4, length)), np.empty((4, length)), np.empty(length), np.empty(length)
+    for i in range(count):
+        _determinant(entries, i, m_re, m_im, d_re, d_im)
+        turns[i], doubtful[i], last[i] = _followed(d_re, d_im, factor_re, factor_im)
+    return turns, doubtful, last
+
+
+@compiled
+def _followed(d_re: Floats, d_im: Floats, factor_re: Floats, factor_im: Floats) -> tuple[int, bool, float]:
+    """Multiply a determinant by its factor in place and follow its phase; see `winding._counted`."""
+    length = len(d_re)
+    for n in range(length):
+        x, y = d_re[n], d_im[n]
+        d_re[n] = x * factor_re[n] - y * factor_im[n]
+        d_im[n] = x * factor_im[n] + y * factor_re[n]
+    turns, doubtful = _turns(d_re, d_im)
+    before = 0.0
+    for n in range(length - 1):
+        change = np.hypot(d_re[n + 1] - d_re[n], d_im[n + 1] - d_im[n])
+        size = np.hypot(d_re[n], d_im[n]) + np.hypot(d_re[n + 1], d_im[n + 1])
+        if max(change, before) > LARGEST_CHANGE * size:
+            doubtful = True
+        if n > 0 and change > LARGEST_CHANGE * (np.hypot(d_re[n - 1], d_im[n - 1]) + np.hypot(d_re[n], d_im[n])):
+            doubtful = True
+        before = change
+    return turns, doubtful, d_re[length - 1]

@@ -7,11 +7,13 @@ symmetry of det M̃ about the real axis, the number of zeros to the right is the
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from fracctl.arrays import Booleans, Complexes, Floats
+from fracctl.arrays import Array, Booleans, Complexes, Floats
 from fracctl.characteristic.bounds import pole_radius
-from fracctl.characteristic.kernels import trace
+from fracctl.characteristic.kernels import LARGEST_CHANGE, follow
 from fracctl.characteristic.matrix import CharacteristicMatrix
 
 _INNER = 1e-5
@@ -34,12 +36,16 @@ def unstable_zeros(matrix: CharacteristicMatrix) -> tuple[Floats, Booleans]:
     outer = 2.0 * float(np.max(pole_radius(matrix)))
     n_line = 2 + int(np.log(outer / _INNER) / np.log(_RATIO))
     line = 1j * np.geomspace(outer, _INNER, n_line)
-    arc = _INNER * np.exp(1j * np.linspace(np.pi / 2, 0.0, 6 * matrix.size + 6))[1:]
+    arc = _INNER * np.exp(1j * np.linspace(np.pi / 2, 0.0, 8))[1:]
     arc[-1] = _INNER
     path = np.concatenate([line, arc])
-    turns, resolved = _turns(matrix, path)
-    zeros, marginal = _at_origin(matrix, turns)
-    marginal |= ~resolved
+    turns, marginal = np.zeros(matrix.batch), np.zeros(matrix.batch, dtype=bool)
+    for block in matrix.blocks():
+        part_turns, resolved = _turns(matrix, block, path)
+        turns += part_turns
+        marginal |= ~resolved
+    zeros, at_origin = _at_origin(matrix, turns)
+    marginal |= at_origin
     return np.where(marginal, np.nan, zeros), marginal
 
 
@@ -65,50 +71,84 @@ def _none_right_of(matrix: CharacteristicMatrix, abscissa: Floats, outer: Floats
     return clear
 
 
-def _turns(matrix: CharacteristicMatrix, path: Complexes) -> tuple[Floats, Booleans]:
+@dataclass(frozen=True)
+class _Scaled:
+    """det M / Π (σ + ρ)^ℓ of one block: finite at the origin, 1 at infinity, with the zeros of det M for Re σ > 0."""
+
+    matrix: CharacteristicMatrix
+    block: list[int]
+    rho: float
+
+    def factor(self, sigma: Complexes) -> Complexes:
+        """Return Π (σ / (σ + ρ))^ℓ, which leads there from det M̃."""
+        factor: Complexes = (sigma / (sigma + self.rho)) ** self.matrix.highest[self.block].sum()
+        return factor
+
+    def __call__(self, sigma: Complexes, rows: Array) -> Complexes:
+        """Return the values for some members, at nodes (k,) or (b, k)."""
+        return self.matrix.take(rows).determinant(sigma, self.block) * self.factor(sigma)
+
+
+def _turns(matrix: CharacteristicMatrix, block: list[int], path: Complexes) -> tuple[Floats, Booleans]:
     """Return phase change over 2π along `path` (b,), and whether every step of it was resolved."""
-    turns, resolved = np.zeros(matrix.batch), np.ones(matrix.batch, dtype=bool)
-    for block in matrix.blocks():
-        part_turns, part_resolved = _block_turns(matrix, block, path)
-        turns += part_turns
-        resolved &= part_resolved
-    return turns, resolved
-
-
-def _block_turns(matrix: CharacteristicMatrix, block: list[int], path: Complexes) -> tuple[Floats, Booleans]:
+    function = _Scaled(matrix, block, abs(path[0]) / (4.0 * len(block)))
+    everyone = np.arange(matrix.batch)
     if len(block) > 2:
-        values = matrix.determinant(path, block)
-        turns, steps = crossings(values)
-        ambiguous, last = steps.any(axis=1), values[:, -1].real
+        values = function(path, everyone)
+        turns, ambiguous = _counted(values)
+        doubtful, last = ambiguous.any(axis=1), values[:, -1].real
     else:
-        counts, ambiguous, ends = trace(matrix.tables(block, path))
-        turns, last = counts.astype(np.float64), ends[1]
+        factor = function.factor(path)
+        tables = matrix.tables(block, path)
+        counts, doubtful, last = follow(tables, np.ascontiguousarray(factor.real), np.ascontiguousarray(factor.imag))
+        turns = counts.astype(np.float64)
     turns = turns + 0.5 * (last < 0.0)
     resolved = np.ones(matrix.batch, dtype=bool)
-    doubtful = np.flatnonzero(ambiguous)
-    if doubtful.size:
-        turns[doubtful], resolved[doubtful] = _refined(matrix.take(doubtful), block, path)
+    again = np.flatnonzero(doubtful)
+    if again.size:
+        turns[again], resolved[again] = _refined(function, again, path)
     return turns, resolved
 
 
-def _refined(matrix: CharacteristicMatrix, block: list[int], path: Complexes) -> tuple[Floats, Booleans]:
-    """Halve the steps that turn by more than a right angle until none does, or they are as short as rounding."""
-    values = matrix.determinant(path, block)
+def _counted(values: Complexes) -> tuple[Floats, Booleans]:
+    """Count as `crossings` does, and mark too each step next to which the function changes by its own size.
+
+    Two zeros close to each other and to the path turn the phase by 2π within a step that they leave no other
+    trace in than the rate at which the magnitude changes around it.
+    """
     turns, ambiguous = crossings(values)
+    change = np.abs(np.diff(values, axis=1))
+    around = change.copy()
+    around[:, 1:] = np.maximum(around[:, 1:], change[:, :-1])
+    around[:, :-1] = np.maximum(around[:, :-1], change[:, 1:])
+    size = np.abs(values)
+    doubtful = around > LARGEST_CHANGE * (size[:, 1:] + size[:, :-1])
+    counted = crossings(values, doubtful)[0] if doubtful.any() else turns
+    return counted, ambiguous | doubtful
+
+
+def _refined(function: _Scaled, members: Array, path: Complexes) -> tuple[Floats, Booleans]:
+    """Halve the doubtful steps until none is, or they are as short as rounding."""
+    values = function(path, members)
+    turns, ambiguous = _counted(values)
     resolved = np.ones(len(turns), dtype=bool)
     rows, steps = np.nonzero(ambiguous)
     left, right = path[steps], path[steps + 1]
     left_value, right_value = values[rows, steps], values[rows, steps + 1]
     while rows.size:
         middle = _between(left, right)
-        value = matrix.take(rows).determinant(middle[:, None], block)[:, 0]
+        value = function(middle[:, None], members[rows])[:, 0]
         stuck = np.abs(right - left) < _SMALLEST_STEP * np.abs(middle)
         resolved[rows[stuck]] = False
+        _, open_ = _counted(np.stack([left_value, value, right_value], axis=1))
         pending = []
-        for a, value_a, b, value_b in [(left, left_value, middle, value), (middle, value, right, right_value)]:
-            turn, open_ = crossings(np.stack([value_a, value_b], axis=1))
-            np.add.at(turns, rows, turn)
-            again = open_[:, 0] & ~stuck
+        for i, (a, value_a, b, value_b) in enumerate(
+            [(left, left_value, middle, value), (middle, value, right, right_value)]
+        ):
+            done = ~open_[:, i]
+            turn, _ = crossings(np.stack([value_a, value_b], axis=1)[done])
+            np.add.at(turns, rows[done], turn)
+            again = open_[:, i] & ~stuck
             pending.append((rows[again], a[again], b[again], value_a[again], value_b[again]))
         rows, left, right, left_value, right_value = (np.concatenate(part) for part in zip(*pending, strict=True))
     return turns + 0.5 * (values[:, -1].real < 0.0), resolved
@@ -121,10 +161,11 @@ def _between(left: Complexes, right: Complexes) -> Complexes:
     return middle
 
 
-def crossings(values: Complexes) -> tuple[Floats, Booleans]:
+def crossings(values: Complexes, skipped: Booleans | None = None) -> tuple[Floats, Booleans]:
     """Count crossings of the negative real axis, counter-clockwise ones as +1, along (b, k).
 
-    A step that turns by more than a right angle is ambiguous: it is marked in (b, k - 1) and not counted.
+    A step that turns by more than a right angle is ambiguous: it is marked in (b, k - 1) and, as the `skipped`
+    steps, not counted.
     """
     re, im = values.real, values.imag
     re0, im0, re1, im1 = re[:, :-1], im[:, :-1], re[:, 1:], im[:, 1:]
@@ -133,6 +174,8 @@ def crossings(values: Complexes) -> tuple[Floats, Booleans]:
     turned = below[:, 1:] != below[:, :-1]
     through_left = (re0 * im1 - re1 * im0) * (im1 - im0) < 0.0
     crossed = turned & through_left & ~ambiguous
+    if skipped is not None:
+        crossed &= ~skipped
     downward = below[:, 1:]
     turns: Floats = (crossed & downward).sum(axis=1) - (crossed & ~downward).sum(axis=1).astype(np.float64)
     return turns, ambiguous

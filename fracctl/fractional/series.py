@@ -77,7 +77,7 @@ def short_time_series(system: LinearFractionalSystem, y0: Floats, y0_rate: Float
     level: dict[_Key, Floats] = {(0, ()): np.moveaxis(y0, -1, 0), (1, ()): np.moveaxis(y0_rate, -1, 0)}
     exponents: list[Floats] = []
     coefficients: list[Floats] = []
-    remainder, cut = np.zeros(y0.shape[:-1]), np.inf
+    remainder, cut = np.zeros(y0.shape[:-1]), highest + 1.0
     for _ in range(_MOST_LEVELS):
         following: dict[_Key, Floats] = {}
         for key, value in level.items():

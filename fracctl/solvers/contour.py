@@ -23,7 +23,7 @@ from fracctl.arrays import Array, Floats, finite
 from fracctl.characteristic.bounds import pole_radius
 from fracctl.characteristic.matrix import CharacteristicMatrix
 from fracctl.characteristic.winding import abscissa_bound, unstable_zeros
-from fracctl.errors import ArgumentError
+from fracctl.errors import ArgumentError, UnsupportedError
 from fracctl.fractional.system import LinearFractionalSystem
 from fracctl.loop import ClosedLoop
 from fracctl.solvers.base import Survey
@@ -131,7 +131,8 @@ class Contour:
                 shift[unstable] = _growth(matrix.take(np.flatnonzero(unstable)), members.horizon)
             given_up = shift * members.horizon > _LARGEST_GROWTH if members.every else unstable
             if given_up.any():
-                yield without_trajectory(members.take(np.flatnonzero(given_up)))
+                word = "diverged" if members.every else "unstable"
+                yield without_trajectory(members.take(np.flatnonzero(given_up)), word)
             yield from self._solved(members, np.flatnonzero(~given_up), pole_radius(matrix), shift)
 
     def _solved(self, members: Members, rows: Array, radius: Floats, shift: Floats) -> Iterator[Survey]:
@@ -141,7 +142,14 @@ class Contour:
             missed: list[Array] = []
             for group in _classes(rows, radius, shift, attempt.ratio):
                 tolerance = max(attempt.safety * self.tolerance, _SMALLEST_TOLERANCE)
-                plan = make_plan(members.horizon, attempt.width * group.radius, group.radius, group.shift, tolerance)
+                try:
+                    hull = attempt.width * group.radius
+                    plan = make_plan(members.horizon, hull, group.radius, group.shift, tolerance)
+                except UnsupportedError:
+                    if members.every:
+                        raise
+                    yield without_trajectory(members.take(group.rows), "failed")
+                    continue
                 cost[group.rows] += plan.nodes
                 part = members.take(group.rows)
                 response = respond(part.system, part.y0, part.rate, plan, part.every)

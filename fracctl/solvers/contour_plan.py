@@ -16,8 +16,8 @@ RATIOS = (3.0, 4.0, 5.0, 6.0, 7.0, 8.0)
 """Last over first time of a window; few values, so that few contours are designed."""
 SERIES_REACH = 0.012
 """Time, times the pole radius, up to which the solution is taken from its power series."""
-SERIES_START = 1e-7
-"""First time of the first panel, relative to its end."""
+SERIES_START = 1e-10
+"""First time of the first panel, relative to the horizon: one for all plans, so that grids can be exchanged."""
 SERIES_NODES = 24
 _LONGEST = 36.0
 """Half-length of a panel times the largest frequency, beyond which a window is split."""
@@ -95,7 +95,7 @@ def make_plan(horizon: float, hull: float, radius: float, shift: float, toleranc
     ratio = next(r for r in RATIOS if r**count >= reach)
     edges = horizon * ratio ** np.arange(-count, 1.0)
     edges[-1] = horizon
-    panels = [Panel(float(edges[0] * SERIES_START), float(edges[0]), SERIES_NODES, logarithmic=True)]
+    panels = [Panel(horizon * SERIES_START, float(edges[0]), SERIES_NODES, logarithmic=True)]
     groups = [_panels(float(a), float(b), hull, tolerance) for a, b in itertools.pairwise(edges)]
     grid = PanelGrid([*panels, *(panel for group in groups for panel in group)])
     windows, first = [], 1

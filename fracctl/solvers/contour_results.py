@@ -90,8 +90,8 @@ def packed(
     return Survey(members.rows[chosen], trajectory)
 
 
-def without_trajectory(members: Members) -> Survey:
-    """Return members proved unstable, with NaN for their trajectories."""
+def without_trajectory(members: Members, status: str) -> Survey:
+    """Return members that have no trajectory, with NaN in its place and `status` to say why."""
     start = members.initial_states()
     k, b, _ = start.shape
     m, q = members.system.n_positions, members.system.n_auxiliary
@@ -105,7 +105,7 @@ def without_trajectory(members: Members) -> Survey:
         initial_controls=blank[..., 0],
         rates=blank,
         auxiliary=np.full((k * b, q, len(grid.times)), np.nan),
-        status=np.full(k * b, "diverged" if members.every else "unstable", dtype=object),
+        status=np.full(k * b, status, dtype=object),
         stable=np.tile(members.stable, k),
         error_estimate=np.full(k * b, np.nan),
         counters={"nodes": np.zeros(k * b, dtype=np.int64)},
