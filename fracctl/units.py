@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from fracctl.errors import ArgumentError
+
 EARTH_GRAVITATIONAL_PARAMETER_KM3_S2 = 398600.4418
 """Geocentric gravitational constant GM, IERS Conventions (2010), Table 1.1."""
 
@@ -14,12 +16,21 @@ class Scales:
     """Length and time that correspond to 1 in dimensionless equations.
 
     ``position[m] = length_m * position``, ``time[s] = time_s * time``.
+
+    Raises:
+        ArgumentError: a unit is not a positive number.
     """
 
     length_m: float
     """Length unit in metres."""
     time_s: float
     """Time unit in seconds."""
+
+    def __post_init__(self) -> None:
+        for name in ("length_m", "time_s"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0.0):
+                raise ArgumentError(name, value, "must be a positive number")
 
     @property
     def speed_m_s(self) -> float:

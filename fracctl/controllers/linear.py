@@ -13,7 +13,7 @@ from fracctl.fractional.terms import FractionalTerm
 class LinearLawTerms:
     """A linear law as data, over y = [ξ, z] with m positions ξ and q auxiliary states z.
 
-        υ = Σ_j C_j D^{γ_j} y,        z' = Σ_j H_j D^{δ_j} y
+    υ = Σ_j C_j D^{γ_j} y,        z' = Σ_j H_j D^{δ_j} y
     """
 
     control: tuple[FractionalTerm, ...]

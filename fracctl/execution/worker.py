@@ -31,7 +31,7 @@ class Work:
     @classmethod
     def of(cls, factory: str, data: Any) -> Work:
         """Return the work of `factory` with plain data."""
-        return cls(factory, json.dumps(data, sort_keys=True))
+        return cls(factory, json.dumps(data))
 
     def evaluation(self) -> Evaluation:
         """Return the evaluation, built at the first call in this process."""

@@ -66,7 +66,7 @@ def design(tolerance: float, ratio: float, height: float) -> ContourShape:
     decades = -np.log(tolerance)
     c = np.linspace(1.0, max(np.log(tolerance / ROUNDING), SMALLEST_RANGE), 10)[:, None, None, None]
     nu = np.geomspace(1e-3, 60.0, 20)[:, None, None]
-    y = np.geomspace(0.02, 1.2, 18)[:, None]
+    y = np.geomspace(0.005, 1.2, 22)[:, None]
     kappa = np.linspace(0.1, 1.0, 10) * (c + nu * (1.0 - np.cos(y))) / y
     middle, bend = c + nu - kappa * y, nu * np.cos(y)
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):

@@ -22,6 +22,8 @@ from fracctl.fractional.terms import powers
 from fracctl.solvers.contour_plan import Plan, Window
 
 SERIES_ORDER = 5.0
+SAFETY = 6.0
+"""Estimate over the largest difference seen: the two rules and the times compared are few."""
 Halves = tuple[Floats, Floats]
 """Z̃ at the odd and at the even nodes of a contour, (k, b, 2N) and (k, b, 2N + 2), real parts first."""
 
@@ -99,7 +101,8 @@ def _largest(differences: Floats) -> Floats:
 
 
 def _relative(difference: Floats, tail: Floats, peak: Floats) -> Floats:
-    error: Floats = np.divide(np.maximum(difference, tail), peak, out=np.zeros_like(peak), where=peak > 0.0)
+    worst = SAFETY * np.maximum(difference, tail)
+    error: Floats = np.divide(worst, peak, out=np.zeros_like(peak), where=peak > 0.0)
     return error
 
 
