@@ -19,17 +19,17 @@ _NOISE = 1e-11
 """Rise, relative to the largest magnitude, below which a maximum is rounding."""
 
 
-def last_crossing(grid: PanelGrid, values: Floats, level: float) -> Floats:
+def last_crossing(grid: PanelGrid, values: Floats, slopes: Floats, level: float) -> Floats:
     """Return the last time at which |values| = level, (b,): 0 if never above, +inf if above at the end.
 
     Args:
         grid: panels with T nodes in all.
         values: (b, T).
+        slopes: `grid.slope(values)`.
         level: positive.
     """
-    contiguous = np.ascontiguousarray(values)
-    slopes = grid.slope(contiguous)
-    panels, y = _last_crossings(grid.y, grid.weights, grid.offsets, contiguous, slopes, float(level))
+    rows, slopes = np.ascontiguousarray(values), np.ascontiguousarray(slopes)
+    panels, y = _last_crossings(grid.y, grid.weights, grid.offsets, rows, slopes, float(level))
     times = np.full(len(values), np.inf)
     times[panels == _NEVER] = 0.0
     found = np.flatnonzero(panels >= 0)
@@ -37,13 +37,20 @@ def last_crossing(grid: PanelGrid, values: Floats, level: float) -> Floats:
     return times
 
 
-def largest_maximum(grid: PanelGrid, values: Floats, with_end: bool) -> Floats:
-    """Return the largest local maximum of `values` (b, T), at least 0, as (b,).
+def largest_excursion(grid: PanelGrid, values: Floats, slopes: Floats, side: Floats, with_end: bool) -> Floats:
+    """Return the largest local maximum, at least 0, of side · values, or of ± values where side is 0, as (b,).
 
     The end of the horizon counts as a maximum on request; the beginning never does.
+
+    Args:
+        grid: panels with T nodes in all.
+        values: (b, T).
+        slopes: `grid.slope(values)`.
+        side: -1, 0 or 1 for each member, (b,).
+        with_end: whether the value at the end counts.
     """
-    contiguous = np.ascontiguousarray(values)
-    largest: Floats = _largest_maxima(grid.y, grid.weights, grid.offsets, contiguous, grid.slope(contiguous), with_end)
+    rows, slopes = np.ascontiguousarray(values), np.ascontiguousarray(slopes)
+    largest: Floats = _largest_excursions(grid.y, grid.weights, grid.offsets, rows, slopes, side, with_end)
     return largest
 
 
@@ -176,33 +183,43 @@ def _last_in_panel(
 
 
 @_compiled
-def _largest_maxima(
-    y: Floats, weights: Floats, offsets: Array, values: Floats, slopes: Floats, with_end: bool
+def _largest_excursions(
+    y: Floats, weights: Floats, offsets: Array, values: Floats, slopes: Floats, side: Floats, with_end: bool
 ) -> Floats:
-    """Largest local maximum of each member.
-
-    A maximum counts if it stands above the lowest value since the last one by more than rounding: where the first
-    panel is flat, slopes are noise.
-    """
-    count, nodes = values.shape
-    largest = np.zeros(count)
-    for i in range(count):
-        row, slope = values[i], slopes[i]
-        noise = _NOISE * np.max(np.abs(row))
-        best = max(row[nodes - 1], 0.0) if with_end else 0.0
-        lowest = row[0]
-        for panel in range(len(offsets) - 1):
-            first, stop = offsets[panel], offsets[panel + 1]
-            for j in range(first, stop - 1):
-                lowest = min(lowest, row[j])
-                if slope[j] > 0.0 >= slope[j + 1]:
-                    reach = row[j] + slope[j] * (y[j + 1] - y[j])
-                    if reach > best and max(row[j], row[j + 1]) - lowest > noise:
-                        top = _root(y, weights, slope, first, stop, y[j], y[j + 1], slope[j], slope[j + 1], 0.0)
-                        best = max(best, _at(y, weights, row, first, stop, top))
-                    lowest = row[j + 1]
-        largest[i] = best
+    """Largest excursion of each member."""
+    largest = np.zeros(len(values))
+    for i in range(len(values)):
+        noise = _NOISE * np.max(np.abs(values[i]))
+        for sign in (-1.0, 1.0):
+            if side[i] != -sign:
+                found = _largest_maximum(y, weights, offsets, values[i], slopes[i], sign, noise)
+                end = sign * values[i, -1] if with_end else 0.0
+                largest[i] = max(largest[i], found, end)
     return largest
+
+
+@_compiled
+def _largest_maximum(
+    y: Floats, weights: Floats, offsets: Array, row: Floats, slope: Floats, sign: float, noise: float
+) -> float:
+    """Largest local maximum of sign · row that stands above what lies between it and the last one by `noise`.
+
+    Where the first panel is flat, slopes are rounding.
+    """
+    best, lowest = 0.0, sign * row[0]
+    for panel in range(len(offsets) - 1):
+        first, stop = offsets[panel], offsets[panel + 1]
+        for j in range(first, stop - 1):
+            here, there = sign * row[j], sign * row[j + 1]
+            rise = sign * slope[j]
+            lowest = min(lowest, here)
+            if rise > 0.0 >= sign * slope[j + 1]:
+                reach = here + rise * (y[j + 1] - y[j])
+                if reach > best and max(here, there) - lowest > noise:
+                    top = _root(y, weights, slope, first, stop, y[j], y[j + 1], slope[j], slope[j + 1], 0.0)
+                    best = max(best, sign * _at(y, weights, row, first, stop, top))
+                lowest = there
+    return best
 
 
 @_compiled

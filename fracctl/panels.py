@@ -115,6 +115,7 @@ class PanelGrid:
         self.offsets = np.concatenate([[0], np.cumsum([panel.nodes for panel in self.panels])])
         pairs = list(zip(self.panels, self.rules, strict=True))
         self.y: Floats = np.concatenate([rule.y for rule in self.rules])
+        self.last: Floats = np.ascontiguousarray(np.concatenate([rule.last for rule in self.rules]))
         self.weights: Floats = np.concatenate([rule.weights for rule in self.rules])
         self.times: Floats = np.concatenate([panel.time(rule.y) for panel, rule in pairs])
         self.rates: Floats = np.concatenate([panel.rate(rule.y) for panel, rule in pairs])
@@ -149,12 +150,6 @@ class PanelGrid:
         for where, _, rule in self.slices():
             out[..., where] = weighted[..., where] @ rule.integral
         return out
-
-    def tail(self, values: Floats) -> Floats:
-        """Return the largest of the last three Chebyshev coefficients of any panel, (…)."""
-        parts = [np.abs(values[..., where] @ rule.last).max(axis=-1) for where, _, rule in self.slices()]
-        largest: Floats = np.max(parts, axis=0)
-        return largest
 
     def evaluate(self, values: Floats, times: Floats) -> Floats:
         """Return values (…, T) interpolated at times (t,); before the first node the first value."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -49,6 +50,11 @@ class Trajectory:
     def horizon(self) -> float:
         """Dimensionless end time."""
         return self.grid.horizon
+
+    @cached_property
+    def slopes(self) -> Floats:
+        """dξ/dy at the nodes in the variable y of the panels, (b, m, T), for the search of extrema."""
+        return self.grid.slope(self.positions)
 
     @property
     def times(self) -> Floats:

@@ -6,7 +6,7 @@ import numpy as np
 
 from fracctl.arrays import Floats
 from fracctl.errors import ArgumentError
-from fracctl.features import largest_maximum
+from fracctl.features import largest_excursion
 from fracctl.trajectory import Trajectory
 
 DEFINITIONS = ("past_equilibrium", "largest_extremum")
@@ -44,17 +44,10 @@ class Overshoot:
         return {self.name: overshoot}
 
     def _component(self, trajectory: Trajectory, component: int) -> Floats:
-        values = trajectory.positions[:, component]
+        values, slopes = trajectory.positions[:, component], trajectory.slopes[:, component]
         past = self.definition == "past_equilibrium"
-        start = trajectory.initial_state[:, component]
-        side = -np.sign(start) if past else np.zeros_like(start)
-        excursion = np.zeros(len(values))
-        for sign in (-1.0, 1.0):
-            rows = np.flatnonzero((side == sign) | (side == 0.0))
-            if rows.size:
-                found = largest_maximum(trajectory.grid, sign * values[rows], with_end=past)
-                excursion[rows] = np.maximum(excursion[rows], found)
-        return excursion
+        side = -np.sign(trajectory.initial_state[:, component]) if past else np.zeros(len(values))
+        return largest_excursion(trajectory.grid, values, slopes, side, with_end=past)
 
 
 def overshoot(trajectory: Trajectory, definition: str = "past_equilibrium", scale: float = 1e4) -> Floats | float:

@@ -33,8 +33,10 @@ class SettlingTime:
 
     def __call__(self, trajectory: Trajectory) -> dict[str, Floats]:
         """Return column ``settling_time``, (b,)."""
-        grid, positions = trajectory.grid, trajectory.positions
-        components = [last_crossing(grid, positions[:, i], self.threshold) for i in range(positions.shape[1])]
+        grid, positions, slopes = trajectory.grid, trajectory.positions, trajectory.slopes
+        components = [
+            last_crossing(grid, positions[:, i], slopes[:, i], self.threshold) for i in range(positions.shape[1])
+        ]
         exact: Floats = np.max(components, axis=0)
         exact[np.isnan(positions).any(axis=(1, 2))] = np.inf
         if self.resolution is None:

@@ -32,7 +32,8 @@ from fracctl.solvers.contour_response import respond
 from fracctl.solvers.contour_results import Members, merged, packed, without_trajectory
 from fracctl.trajectory import Trajectory
 
-_CHUNK = 1024
+_CHUNK = 1536
+"""Trajectories solved at once: their transforms stay in the cache."""
 _LARGEST_GROWTH = 200.0
 """Exponent of growth over the horizon beyond which an unstable trajectory is given up as diverged."""
 _FEWEST_SHARED = 8
@@ -140,7 +141,7 @@ class Contour:
         cost = np.zeros(len(radius), dtype=np.int64)
         for attempt in _ATTEMPTS:
             missed: list[Array] = []
-            for group in _classes(rows, radius, shift, attempt.ratio):
+            for group in _classes(rows, radius, shift, attempt.ratio, max(_CHUNK // len(members.y0), 1)):
                 tolerance = max(attempt.safety * self.tolerance, _SMALLEST_TOLERANCE)
                 try:
                     hull = attempt.width * group.radius
@@ -202,11 +203,11 @@ def _equal_orders(system: LinearFractionalSystem) -> Iterator[Array]:
         yield np.flatnonzero(which == value)
 
 
-def _classes(rows: Array, radius: Floats, shift: Floats, ratio: float) -> Iterator[_Group]:
+def _classes(rows: Array, radius: Floats, shift: Floats, ratio: float, chunk: int) -> Iterator[_Group]:
     """Split rows by shift and by pole radius, rounded up to powers of `ratio`, into chunks."""
     level = np.ceil(np.log(radius[rows]) / np.log(ratio)).astype(int)
     for a in np.unique(shift[rows]):
         for k in np.unique(level[shift[rows] == a]):
             group = rows[(shift[rows] == a) & (level == k)]
-            for start in range(0, len(group), _CHUNK):
-                yield _Group(group[start : start + _CHUNK], float(ratio**k), float(a))
+            for start in range(0, len(group), chunk):
+                yield _Group(group[start : start + chunk], float(ratio**k), float(a))

@@ -19,6 +19,7 @@ from fracctl.characteristic.winding import crossings
 from fracctl.fractional.series import short_time_series
 from fracctl.fractional.system import LinearFractionalSystem
 from fracctl.fractional.terms import powers
+from fracctl.solvers.contour_kernels import controls_and_errors
 from fracctl.solvers.contour_plan import Plan, Window
 
 SERIES_ORDER = 5.0
@@ -69,17 +70,23 @@ def respond(system: LinearFractionalSystem, y0: Floats, y0_rate: Floats, plan: P
                 wanted = _Derivative(column, term.orders[..., column])
                 places.append((j, column, _index(orders, wanted)))
     values, differences, initial, enclosed = _derivatives(system, y0, y0_rate, plan, orders)
-    controls, control_difference = _controls(system, places, values, differences)
-    initial_controls = _controls(system, places, initial, differences)[0][..., 0]
-    positions = np.moveaxis(values[:m], 0, 2)
-    tail = plan.grid.tail
-    error = np.maximum(
-        _relative(_largest(differences[:m]), tail(positions).max(axis=-1), _peak(positions, y0[..., :m])),
-        _relative(control_difference.max(axis=(0, -1)), tail(controls).max(axis=-1), _peak(controls)),
+    gains = np.zeros((b, m, len(orders)))
+    for j, column, where in places:
+        gains[:, :, where] += system.control[j].matrix[..., column]
+    controls, peaks, tails, worst = controls_and_errors(
+        values, differences, gains, plan.grid.offsets, plan.grid.last, m
     )
-    rates = np.moveaxis(values[p : p + m], 0, 2) if with_rates else None
-    auxiliary = np.moveaxis(values[m:p], 0, 2)
-    return Response(positions, rates, auxiliary, controls, initial_controls, error, enclosed)
+    peaks[0] = np.maximum(peaks[0], np.abs(y0[..., :m]).max(axis=-1))
+    errors = np.divide(SAFETY * np.maximum(tails, worst), peaks, out=np.zeros_like(peaks), where=peaks > 0.0)
+    return Response(
+        positions=np.moveaxis(values[:m], 0, 2),
+        rates=np.moveaxis(values[p : p + m], 0, 2) if with_rates else None,
+        auxiliary=np.moveaxis(values[m:p], 0, 2),
+        controls=controls,
+        initial_controls=np.einsum("bmw,wkb->kbm", gains, initial[..., 0]),
+        error=errors.max(axis=0),
+        enclosed=enclosed,
+    )
 
 
 def _index(orders: list[_Derivative], wanted: _Derivative) -> int:
@@ -88,40 +95,6 @@ def _index(orders: list[_Derivative], wanted: _Derivative) -> int:
             return i
     orders.append(wanted)
     return len(orders) - 1
-
-
-def _peak(values: Floats, initial: Floats | None = None) -> Floats:
-    peak: Floats = np.abs(values).max(axis=(-2, -1))
-    return peak if initial is None else np.maximum(peak, np.abs(initial).max(axis=-1))
-
-
-def _largest(differences: Floats) -> Floats:
-    largest: Floats = differences.max(axis=(0, -1))
-    return largest
-
-
-def _relative(difference: Floats, tail: Floats, peak: Floats) -> Floats:
-    worst = SAFETY * np.maximum(difference, tail)
-    error: Floats = np.divide(worst, peak, out=np.zeros_like(peak), where=peak > 0.0)
-    return error
-
-
-def _controls(
-    system: LinearFractionalSystem, places: list[tuple[int, int, int]], values: Floats, differences: Floats
-) -> tuple[Floats, Floats]:
-    """Combine derivatives to υ (k, b, m, T), and their differences to a bound (m, k, b, c)."""
-    _, k, b, t = values.shape
-    m = system.n_positions
-    controls = np.zeros((k, b, m, t))
-    difference = np.zeros((m, k, b, differences.shape[-1]))
-    for j, column, where in places:
-        matrix = np.broadcast_to(system.control[j].matrix, (b, m, system.size))
-        for row in range(m):
-            gain = matrix[:, row, column]
-            if np.any(gain):
-                controls[:, :, row] += gain[:, None] * values[where]
-                difference[row] += np.abs(gain)[:, None] * differences[where]
-    return controls, difference
 
 
 def _derivatives(

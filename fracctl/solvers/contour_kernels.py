@@ -1,0 +1,65 @@
+"""Compiled loops that finish a response: controls from derivatives, peaks, and what is left of the interpolation."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fracctl.arrays import Array, Floats
+from fracctl.characteristic.kernels import compiled
+
+
+@compiled
+def controls_and_errors(
+    values: Floats, differences: Floats, gains: Floats, offsets: Array, last: Floats, positions: int
+) -> tuple[Floats, Floats, Floats, Floats]:
+    """Combine derivatives to controls, and bound the errors of positions and controls.
+
+    Args:
+        values: derivatives of coordinates at the nodes, (w, k, b, T); the first `positions` are the positions.
+        differences: largest difference of the two rules for each, (w, k, b, c).
+        gains: υ_i = Σ_w gains[b, i, w] values[w], (b, m, w).
+        offsets: first node of each panel, and T.
+        last: weights of the last three Chebyshev coefficients of each panel, (T, 3).
+        positions: m.
+
+    Returns:
+        Controls (k, b, m, T), peaks of positions and of controls (2, k, b), largest last coefficient (2, k, b) and
+        largest difference (2, k, b).
+    """
+    count, k, b, nodes = values.shape
+    m = gains.shape[1]
+    controls = np.zeros((k, b, m, nodes))
+    peaks, tails, worst = np.zeros((2, k, b)), np.zeros((2, k, b)), np.zeros((2, k, b))
+    for j in range(k):
+        for i in range(b):
+            for row in range(positions):
+                peaks[0, j, i] = max(peaks[0, j, i], np.max(np.abs(values[row, j, i])))
+                tails[0, j, i] = max(tails[0, j, i], _tail(values[row, j, i], offsets, last))
+                worst[0, j, i] = max(worst[0, j, i], np.max(differences[row, j, i]))
+            for row in range(m):
+                out = controls[j, i, row]
+                difference = 0.0
+                for w in range(count):
+                    gain = gains[i, row, w]
+                    if gain != 0.0:
+                        for n in range(nodes):
+                            out[n] += gain * values[w, j, i, n]
+                        difference += abs(gain) * np.max(differences[w, j, i])
+                peaks[1, j, i] = max(peaks[1, j, i], np.max(np.abs(out)))
+                tails[1, j, i] = max(tails[1, j, i], _tail(out, offsets, last))
+                worst[1, j, i] = max(worst[1, j, i], difference)
+    return controls, peaks, tails, worst
+
+
+@compiled
+def _tail(row: Floats, offsets: Array, last: Floats) -> float:
+    """Largest of the last three Chebyshev coefficients of any panel."""
+    largest = 0.0
+    for panel in range(len(offsets) - 1):
+        a, b, c = 0.0, 0.0, 0.0
+        for n in range(offsets[panel], offsets[panel + 1]):
+            a += row[n] * last[n, 0]
+            b += row[n] * last[n, 1]
+            c += row[n] * last[n, 2]
+        largest = max(largest, abs(a), abs(b), abs(c))
+    return largest
