@@ -7,14 +7,12 @@ expressions they cost ten times as much.
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 
 from fracctl.arrays import Array, Floats
 from fracctl.panels import PanelGrid
+from fracctl.polynomials import at, bracketed_root, compiled, node_root, peak
 
-_compiled = numba.njit(cache=True, error_model="numpy")
-_summing = numba.njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract"})
 _NOISE = 1e-11
 """Rise, relative to the largest magnitude, below which a maximum is rounding."""
 
@@ -72,76 +70,17 @@ def value_at(grid: PanelGrid, values: Floats, times: Floats) -> Floats:
 _NEVER, _BEYOND = -1, -2
 
 
-@_summing
-def _at(y: Floats, weights: Floats, values: Floats, first: int, stop: int, point: float) -> float:
-    """Value at `point` of the polynomial through the nodes first … stop - 1 (barycentric form)."""
-    above, below = 0.0, 0.0
-    for j in range(first, stop):
-        share = weights[j] / (point - y[j])
-        above += share * values[j]
-        below += share
-    value: float = above / below
-    if value != value:
-        for j in range(first, stop):
-            if point == y[j]:
-                value = values[j]
-    return value
-
-
-@_compiled
-def _root(
-    y: Floats,
-    weights: Floats,
-    values: Floats,
-    first: int,
-    stop: int,
-    low: float,
-    high: float,
-    f_low: float,
-    f_high: float,
-    level: float,
-) -> float:
-    """A root of the polynomial minus `level` between low and high, by Ridders' method on a bracket."""
-    f_low -= level
-    f_high -= level
-    if f_low == 0.0:
-        return low
-    point: float = high
-    for _ in range(60):
-        middle: float = 0.5 * (low + high)
-        f_middle = _at(y, weights, values, first, stop, middle) - level
-        scale = np.sqrt(f_middle * f_middle - f_low * f_high)
-        if scale == 0.0:
-            return middle
-        following: float = middle + (middle - low) * (1.0 if f_low > f_high else -1.0) * f_middle / scale
-        f = _at(y, weights, values, first, stop, following) - level
-        if f == 0.0 or abs(following - point) < 1e-13:
-            return following
-        point = following
-        if (f_middle > 0.0) != (f > 0.0):
-            low, f_low, high, f_high = middle, f_middle, following, f
-            if low > high:
-                low, f_low, high, f_high = high, f_high, low, f_low
-        elif (f_low > 0.0) != (f > 0.0):
-            high, f_high = following, f
-        else:
-            low, f_low = following, f
-        if high - low < 1e-13:
-            return point
-    return point
-
-
-@_compiled
+@compiled
 def _values_at(y: Floats, weights: Floats, offsets: Array, values: Floats, panels: Array, points: Floats) -> Floats:
     """Value of each member at its own point."""
     out = np.empty(len(points))
     for i in range(len(points)):
         first, stop = offsets[panels[i]], offsets[panels[i] + 1]
-        out[i] = _at(y, weights, values[i], first, stop, points[i])
+        out[i] = at(y, weights, values[i], first, stop, points[i])
     return out
 
 
-@_compiled
+@compiled
 def _last_crossings(
     y: Floats, weights: Floats, offsets: Array, values: Floats, slopes: Floats, level: float
 ) -> tuple[Array, Floats]:
@@ -162,7 +101,7 @@ def _last_crossings(
     return panels, points
 
 
-@_compiled
+@compiled
 def _last_in_panel(
     y: Floats, weights: Floats, row: Floats, slope: Floats, first: int, stop: int, level: float
 ) -> float:
@@ -173,16 +112,16 @@ def _last_in_panel(
         here, there = row[j], row[j + 1]
         sign = 1.0 if here > 0.0 else -1.0
         if abs(here) > level:
-            return _root(y, weights, row, first, stop, y[j], y[j + 1], here, there, sign * level)
+            return node_root(y, weights, row, slope, first, stop, j, sign * level, 1e-8)
         if sign * slope[j] > 0.0 >= sign * slope[j + 1] and abs(here) + abs(slope[j]) * (y[j + 1] - y[j]) > level:
-            top = _root(y, weights, slope, first, stop, y[j], y[j + 1], slope[j], slope[j + 1], 0.0)
-            height = _at(y, weights, row, first, stop, top)
+            top, height = peak(y, weights, row, slope, first, stop, j)
             if sign * height > level:
-                return _root(y, weights, row, first, stop, top, y[j + 1], height, there, sign * level)
+                f_top, f_there = height - sign * level, there - sign * level
+                return bracketed_root(y, weights, row, first, stop, top, y[j + 1], f_top, f_there, sign * level)
     return -2.0
 
 
-@_compiled
+@compiled
 def _largest_excursions(
     y: Floats, weights: Floats, offsets: Array, values: Floats, slopes: Floats, side: Floats, with_end: bool
 ) -> Floats:
@@ -198,7 +137,7 @@ def _largest_excursions(
     return largest
 
 
-@_compiled
+@compiled
 def _largest_maximum(
     y: Floats, weights: Floats, offsets: Array, row: Floats, slope: Floats, sign: float, noise: float
 ) -> float:
@@ -216,13 +155,13 @@ def _largest_maximum(
             if rise > 0.0 >= sign * slope[j + 1]:
                 reach = here + rise * (y[j + 1] - y[j])
                 if reach > best and max(here, there) - lowest > noise:
-                    top = _root(y, weights, slope, first, stop, y[j], y[j + 1], slope[j], slope[j + 1], 0.0)
-                    best = max(best, sign * _at(y, weights, row, first, stop, top))
+                    height = peak(y, weights, row, slope, first, stop, j)[1]
+                    best = max(best, sign * height)
                 lowest = there
     return best
 
 
-@_compiled
+@compiled
 def _absolute_integrals(
     y: Floats, weights: Floats, offsets: Array, values: Floats, slopes: Floats, integrals: Floats
 ) -> Floats:
@@ -236,25 +175,24 @@ def _absolute_integrals(
             for j in range(first, stop - 1):
                 here, there = row[j], row[j + 1]
                 if (here > 0.0) != (there > 0.0):
-                    zero = _root(y, weights, row, first, stop, y[j], y[j + 1], here, there, 0.0)
-                    reached = _at(y, weights, integral, first, stop, zero)
+                    zero = node_root(y, weights, row, slope, first, stop, j, 0.0, 1e-4)
+                    reached = at(y, weights, integral, first, stop, zero)
                     totals[i] += abs(reached - mark)
                     mark = reached
                 elif _may_dip(here, there, slope[j], slope[j + 1], y[j + 1] - y[j]):
-                    low = _root(y, weights, slope, first, stop, y[j], y[j + 1], slope[j], slope[j + 1], 0.0)
-                    bottom = _at(y, weights, row, first, stop, low)
+                    low, bottom = peak(y, weights, row, slope, first, stop, j)
                     if (bottom > 0.0) != (here > 0.0):
-                        down = _root(y, weights, row, first, stop, y[j], low, here, bottom, 0.0)
-                        up = _root(y, weights, row, first, stop, low, y[j + 1], bottom, there, 0.0)
-                        reached = _at(y, weights, integral, first, stop, down)
+                        down = bracketed_root(y, weights, row, first, stop, y[j], low, here, bottom, 0.0)
+                        up = bracketed_root(y, weights, row, first, stop, low, y[j + 1], bottom, there, 0.0)
+                        reached = at(y, weights, integral, first, stop, down)
                         totals[i] += abs(reached - mark)
-                        mark = _at(y, weights, integral, first, stop, up)
+                        mark = at(y, weights, integral, first, stop, up)
                         totals[i] += abs(mark - reached)
             totals[i] += abs(integral[stop - 1] - mark)
     return totals
 
 
-@_compiled
+@compiled
 def _may_dip(here: float, there: float, fall: float, rise: float, width: float) -> bool:
     """Whether a function of one sign at two nodes may change it between them: its tangents meet beyond zero."""
     sign = 1.0 if here > 0.0 else -1.0

@@ -20,6 +20,7 @@ BOTTOM_UP = (
     "loop",
     "characteristic",
     "panels",
+    "polynomials",
     "features",
     "trajectory",
     "solvers",
