@@ -9,10 +9,11 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass
 
+import numba
 import numpy as np
 from scipy.special import rgamma
 
-from fracctl.arrays import Floats
+from fracctl.arrays import Array, Floats
 from fracctl.errors import UnsupportedError
 from fracctl.fractional.system import LinearFractionalSystem
 
@@ -74,49 +75,89 @@ def short_time_series(system: LinearFractionalSystem, y0: Floats, y0_rate: Float
         UnsupportedError: an order lies so near the highest of its equation that the powers are too dense.
     """
     symbols = _symbols(system)
-    level: dict[_Key, Floats] = {(0, ()): np.moveaxis(y0, -1, 0), (1, ()): np.moveaxis(y0_rate, -1, 0)}
-    exponents: list[Floats] = []
-    coefficients: list[Floats] = []
-    remainder, cut = np.zeros(y0.shape[:-1]), highest + 1.0
+    present = [{i for i in range(system.size) if np.any(values[..., i])} for values in (y0, y0_rate)]
+    recipe = _recipe(symbols, present, highest)
+    lead = y0.shape[:-1]
+    entries = [entry for symbol in symbols for entry in symbol.entries.values()] or [np.zeros(())]
+    gains = np.stack([np.broadcast_to(entry, lead[-1:]) for entry in entries])
+    coefficients = np.zeros((len(recipe.exponents), system.size, int(np.prod(lead[:-1])), lead[-1]))
+    for start, values in enumerate((y0, y0_rate)):
+        coefficients[start] = np.moveaxis(values, -1, 0).reshape(coefficients.shape[1:])
+    _apply(recipe.steps, gains, coefficients)
+    coefficients = coefficients.reshape(-1, system.size, *lead)
+    kept = [i for i, e in enumerate(recipe.exponents) if np.min(e) <= highest]
+    omitted = [i for i, e in enumerate(recipe.exponents) if np.min(e) > highest]
+    sizes = [float(np.min(recipe.exponents[i])) for i in omitted]
+    remainders = [np.abs(coefficients[i]).max(axis=0) * rgamma(e + 1.0) for i, e in zip(omitted, sizes, strict=True)]
+    remainder = np.max(remainders, axis=0) if remainders else np.zeros(lead)
+    cut = min(sizes, default=highest + 1.0)
+    return PowerSeries([recipe.exponents[i] for i in kept], [coefficients[i] for i in kept], remainder, cut)
+
+
+@dataclass(frozen=True)
+class _Recipe:
+    """Which coefficient feeds which: rows (target, source, row, column, entry), and the exponents in order."""
+
+    exponents: list[Floats]
+    steps: Array
+
+
+def _recipe(symbols: list[_Symbol], present: list[set[int]], highest: float) -> _Recipe:
+    """Follow the recursion level by level; coefficients beyond `highest` are fed but feed no others.
+
+    `present` tells which components of y(0) and of y'(0) are not zero.
+    """
+    places = [(number, place) for number, symbol in enumerate(symbols) for place in symbol.entries]
+    keys: list[_Key] = [(0, ()), (1, ())]
+    index = {key: i for i, key in enumerate(keys)}
+    exponents = [_exponent(key, symbols) for key in keys]
+    present = list(present)
+    steps: list[tuple[int, int, int, int, int]] = []
+    level = keys
     for _ in range(_MOST_LEVELS):
-        following: dict[_Key, Floats] = {}
-        for key, value in level.items():
-            e = _exponent(key, symbols)
+        following: list[_Key] = []
+        for key in level:
+            e = exponents[index[key]]
             if np.min(e) > highest:
-                remainder = np.maximum(remainder, np.abs(value).max(axis=0) * rgamma(float(np.min(e)) + 1.0))
-                cut = min(cut, float(np.min(e)))
                 continue
-            exponents.append(e)
-            coefficients.append(value)
-            for number, symbol in enumerate(symbols):
-                if not _killed(e, symbol.order):
-                    symbol.feed(value, following, _extended(key, number))
+            for entry, (number, (row, column)) in enumerate(places):
+                if column not in present[index[key]] or _killed(e, symbols[number].order):
+                    continue
+                new = _extended(key, number)
+                if new not in index:
+                    index[new] = len(index)
+                    exponents.append(_exponent(new, symbols))
+                    present.append(set())
+                    following.append(new)
+                present[index[new]].add(row)
+                steps.append((index[new], index[key], row, column, entry))
         level = following
         if not level:
-            break
-    else:
-        raise UnsupportedError(
-            "an order of the loop lies too near the highest order of its equation, so that the powers of its"
-            " short-time solution are too dense; lower the order or drop the term"
-        )
-    return PowerSeries(exponents, coefficients, remainder, cut)
+            return _Recipe(exponents, np.array(steps, dtype=np.int64).reshape(-1, 5))
+    raise UnsupportedError(
+        "an order of the loop lies too near the highest order of its equation, so that the powers of its"
+        " short-time solution are too dense; lower the order or drop the term"
+    )
 
 
-@dataclass
+@numba.njit(cache=True)
+def _apply(steps: Array, gains: Floats, coefficients: Floats) -> None:
+    """Run the recursion on coefficients (E, p, k, b) with gains (entries, b), in place."""
+    _, _, k, b = coefficients.shape
+    for step in range(len(steps)):
+        target, source, row, column, entry = steps[step]
+        for i in range(k):
+            for j in range(b):
+                coefficients[target, row, i, j] -= gains[entry, j] * coefficients[source, column, i, j]
+
+
+@dataclass(frozen=True)
 class _Symbol:
     """All entries of the terms that shift exponents alike: same order, same ℓ_i - β."""
 
     shift: Floats
     order: Floats
     entries: dict[tuple[int, int], Floats]
-
-    def feed(self, value: Floats, following: dict[_Key, Floats], key: _Key) -> None:
-        """Add the contribution of coefficients `value` (p, …, b) to those of `key` in `following`."""
-        for (row, column), entry in self.entries.items():
-            if np.any(value[column]):
-                if key not in following:
-                    following[key] = np.zeros_like(value)
-                following[key][row] -= entry * value[column]
 
 
 def _symbols(system: LinearFractionalSystem) -> list[_Symbol]:
