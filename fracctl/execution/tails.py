@@ -47,10 +47,11 @@ def notes_on_tails(evaluation: Evaluation, found: Iterable[Mapping[str, Any]]) -
 
 def _growth(evaluation: Evaluation, optimum: Mapping[str, Any], trajectory: Trajectory) -> Iterator[str]:
     measures: tuple[Any, ...] = evaluation.measures
-    if not any(isinstance(measure, ControlEffort) for measure in measures):
+    measure = next((measure for measure in measures if isinstance(measure, ControlEffort)), None)
+    if measure is None:
         return
     effort = float(optimum["control_effort"])
-    growth = float(ControlEffort()(trajectory)["control_effort"][0]) - effort
+    growth = float(measure(trajectory)["control_effort"][0]) - effort
     if growth > GROWTH * effort:
         first, last = _turns(evaluation.horizon), _turns(2.0 * evaluation.horizon)
         yield (

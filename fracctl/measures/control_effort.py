@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from fracctl.arrays import Floats
+from fracctl.errors import ArgumentError
 from fracctl.features import absolute_integral
+from fracctl.measures.samples import Samples
 from fracctl.trajectory import Trajectory
 
 
@@ -14,23 +16,46 @@ class ControlEffort:
 
     For α < 1 and an initial displacement the tail υ ~ s^(-α) makes U grow without bound with S: compare only values
     of one horizon. Times the speed scale of the plant it is a ΔV.
+
+    Args:
+        resolution: None for the exact integral of the interpolant. A number takes the trapezoidal rule on the samples
+            0, resolution, 2 resolution, … with υ(0+), as the paper does; where υ ~ s^(1-α) near 0 it falls short,
+            with 0.01 by up to 0.5 % at α = 0.91.
+
+    Raises:
+        ArgumentError: resolution is not positive.
     """
 
     name = "control_effort"
     columns = ("control_effort",)
+
+    def __init__(self, resolution: float | None = None) -> None:
+        if resolution is not None and not (np.isfinite(resolution) and resolution > 0.0):
+            raise ArgumentError("resolution", resolution, "must be positive")
+        self.resolution = resolution
 
     def __call__(self, trajectory: Trajectory) -> dict[str, Floats]:
         """Return column ``control_effort``, (b,)."""
         controls = trajectory.controls_at_nodes
         blank = np.isnan(controls.sum(axis=(1, 2)))
         clean = np.where(blank[:, None, None], 0.0, controls) if blank.any() else controls
-        total = sum(absolute_integral(trajectory.grid, clean[:, i]) for i in range(controls.shape[1]))
-        first = np.abs(clean[:, :, 0]).sum(axis=1) * trajectory.grid.panels[0].start
-        effort: Floats = np.where(blank, np.inf, total + first)
-        return {self.name: effort}
+        effort = self._exact(trajectory, clean) if self.resolution is None else self._sampled(trajectory, clean)
+        return {self.name: np.where(blank, np.inf, effort)}
+
+    def _exact(self, trajectory: Trajectory, controls: Floats) -> Floats:
+        total = sum(absolute_integral(trajectory.grid, controls[:, i]) for i in range(controls.shape[1]))
+        first: Floats = np.abs(controls[:, :, 0]).sum(axis=1) * trajectory.grid.panels[0].start
+        return total + first
+
+    def _sampled(self, trajectory: Trajectory, controls: Floats) -> Floats:
+        assert self.resolution is not None
+        samples, initial = Samples(trajectory.grid, self.resolution), trajectory.initial_controls
+        components = [samples.absolute_integral(controls[:, i], initial[:, i]) for i in range(controls.shape[1])]
+        effort: Floats = np.sum(components, axis=0)
+        return effort
 
 
-def control_effort(trajectory: Trajectory) -> Floats | float:
+def control_effort(trajectory: Trajectory, resolution: float | None = None) -> Floats | float:
     """Return the control effort of each trajectory, (b,), or a number for a single one; see `ControlEffort`."""
-    value = ControlEffort()(trajectory)["control_effort"]
+    value = ControlEffort(resolution)(trajectory)["control_effort"]
     return value if trajectory.batched else float(value[0])

@@ -7,6 +7,7 @@ import numpy as np
 from fracctl.arrays import Floats
 from fracctl.errors import ArgumentError
 from fracctl.features import largest_excursion
+from fracctl.measures.samples import Samples
 from fracctl.trajectory import Trajectory
 
 DEFINITIONS = ("past_equilibrium", "largest_extremum")
@@ -20,37 +21,47 @@ class Overshoot:
             displacement, on either side where that is 0. ``largest_extremum``: x̂ is the largest extremum of |x|
             on either side, the initial position not counted.
         scale: c > 0.
+        resolution: None for the exact extrema of the interpolant. A number takes the largest of the samples 0,
+            resolution, 2 resolution, …; for ``largest_extremum`` of those that turn between their neighbours.
 
     Raises:
-        ArgumentError: an unknown definition, or a scale that is not positive.
+        ArgumentError: an unknown definition, or a scale or resolution that is not positive.
     """
 
     name = "overshoot"
     columns = ("overshoot",)
 
-    def __init__(self, definition: str = "past_equilibrium", scale: float = 1e4) -> None:
+    def __init__(
+        self, definition: str = "past_equilibrium", scale: float = 1e4, resolution: float | None = None
+    ) -> None:
         if definition not in DEFINITIONS:
             raise ArgumentError("definition", repr(definition), f"must be one of {DEFINITIONS}")
-        if not (np.isfinite(scale) and scale > 0.0):
-            raise ArgumentError("scale", scale, "must be positive")
-        self.definition, self.scale = definition, float(scale)
+        for name, value in (("scale", scale), ("resolution", resolution)):
+            if value is not None and not (np.isfinite(value) and value > 0.0):
+                raise ArgumentError(name, value, "must be positive")
+        self.definition, self.scale, self.resolution = definition, float(scale), resolution
 
     def __call__(self, trajectory: Trajectory) -> dict[str, Floats]:
         """Return column ``overshoot``, (b,)."""
         m = trajectory.positions.shape[1]
-        total = sum(self._component(trajectory, i) for i in range(m))
+        samples = None if self.resolution is None else Samples(trajectory.grid, self.resolution)
+        total = sum(self._component(trajectory, i, samples) for i in range(m))
         overshoot = 1.0 + self.scale * total / m
         overshoot[np.isnan(trajectory.positions).any(axis=(1, 2))] = np.inf
         return {self.name: overshoot}
 
-    def _component(self, trajectory: Trajectory, component: int) -> Floats:
-        values, slopes = trajectory.positions[:, component], trajectory.slopes[:, component]
+    def _component(self, trajectory: Trajectory, component: int, samples: Samples | None) -> Floats:
+        values, start = trajectory.positions[:, component], trajectory.initial_state[:, component]
         past = self.definition == "past_equilibrium"
-        side = -np.sign(trajectory.initial_state[:, component]) if past else np.zeros(len(values))
-        return largest_excursion(trajectory.grid, values, slopes, side, with_end=past)
+        side = -np.sign(start) if past else np.zeros(len(values))
+        if samples is None:
+            return largest_excursion(trajectory.grid, values, trajectory.slopes[:, component], side, with_end=past)
+        return samples.largest_excursion(values, start, side) if past else samples.largest_extremum(values, start)
 
 
-def overshoot(trajectory: Trajectory, definition: str = "past_equilibrium", scale: float = 1e4) -> Floats | float:
+def overshoot(
+    trajectory: Trajectory, definition: str = "past_equilibrium", scale: float = 1e4, resolution: float | None = None
+) -> Floats | float:
     """Return the overshoot of each trajectory, (b,), or a number for a single one; see `Overshoot`."""
-    value = Overshoot(definition, scale)(trajectory)["overshoot"]
+    value = Overshoot(definition, scale, resolution)(trajectory)["overshoot"]
     return value if trajectory.batched else float(value[0])
