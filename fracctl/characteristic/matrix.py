@@ -5,6 +5,7 @@ M̃ → I as |σ| → ∞; its zeros off the cut (-∞, 0] are the principal-she
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,18 +42,14 @@ class Entry:
     def _lead(self) -> tuple[int, ...]:
         return np.broadcast_shapes(self.coefficients.shape[:-1], self.exponents.shape[:-1])
 
-    def table(self, sigma: Complexes, batch: int) -> tuple[Floats, Floats, Floats]:
-        """Return coefficients (b, J) and real and imaginary powers at σ (P,), each (1, J, P) or (b, J, P)."""
-        coefficients = np.broadcast_to(self.coefficients, (batch, self.exponents.shape[-1]))
-        basis = powers(sigma, self.exponents)
-        basis = basis[None] if self.exponents.ndim == 1 else basis
-        return np.ascontiguousarray(coefficients), np.ascontiguousarray(basis.real), np.ascontiguousarray(basis.imag)
-
     def magnitude(self, radius: Floats) -> Floats:
         """Return Σ_e |c_e| r^e for radii r (b,)."""
         total: Floats = np.sum(np.abs(self.coefficients) * radius[:, None] ** self.exponents, axis=-1)
         return total
 
+
+PowerTable = Callable[[Floats], tuple[Floats, Floats]]
+"""From exponents (J,) or (b, J) to real and imaginary parts of powers along a path, (1, J, P) or (b, J, P)."""
 
 _ZERO = Entry(np.zeros(1), np.zeros(1))
 
@@ -86,10 +83,14 @@ class CharacteristicMatrix:
             groups = [group for group in groups if not group & linked] + [linked.union(*joined)]
         return sorted(sorted(group) for group in groups)
 
-    def tables(self, block: list[int], sigma: Complexes) -> tuple[tuple[Floats, Floats, Floats], ...]:
-        """Return the tables of the entries of a block at σ (P,), row by row."""
+    def tables(self, block: list[int], table: PowerTable) -> tuple[tuple[Floats, Floats, Floats], ...]:
+        """Return the entries of a block, row by row, as coefficients (b, J) and the table of their powers."""
         entries = [self.entries[i][k] or _ZERO for i in block for k in block]
-        return tuple(entry.table(sigma, self.batch) for entry in entries)
+        return tuple((self._coefficients(entry), *table(entry.exponents)) for entry in entries)
+
+    def _coefficients(self, entry: Entry) -> Floats:
+        shape = (self.batch, entry.exponents.shape[-1])
+        return np.ascontiguousarray(np.broadcast_to(entry.coefficients, shape))
 
     def take(self, rows: Array) -> CharacteristicMatrix:
         """Return the matrix of the members `rows`."""

@@ -15,6 +15,7 @@ from fracctl.arrays import Array, Booleans, Complexes, Floats
 from fracctl.characteristic.bounds import pole_radius
 from fracctl.characteristic.kernels import LARGEST_CHANGE, follow
 from fracctl.characteristic.matrix import CharacteristicMatrix
+from fracctl.fractional.terms import powers
 
 _INNER = 1e-5
 """Radius of the arc around the branch point; zeros on the real axis inside it are found by the sign at 0."""
@@ -99,7 +100,7 @@ def _turns(matrix: CharacteristicMatrix, block: list[int], path: Complexes) -> t
         doubtful, last = ambiguous.any(axis=1), values[:, -1].real
     else:
         factor = function.factor(path)
-        tables = matrix.tables(block, path)
+        tables = matrix.tables(block, lambda exponents: _table(path, exponents))
         counts, doubtful, last = follow(tables, np.ascontiguousarray(factor.real), np.ascontiguousarray(factor.imag))
         turns = counts.astype(np.float64)
     turns = turns + 0.5 * (last < 0.0)
@@ -108,6 +109,11 @@ def _turns(matrix: CharacteristicMatrix, block: list[int], path: Complexes) -> t
     if again.size:
         turns[again], resolved[again] = _refined(function, again, path)
     return turns, resolved
+
+
+def _table(path: Complexes, exponents: Floats) -> tuple[Floats, Floats]:
+    values = powers(path, np.atleast_2d(exponents))
+    return np.ascontiguousarray(values.real), np.ascontiguousarray(values.imag)
 
 
 def _counted(values: Complexes) -> tuple[Floats, Booleans]:

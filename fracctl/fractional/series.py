@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass
+from functools import cached_property, lru_cache
 
 import numba
 import numpy as np
@@ -29,8 +30,8 @@ class PowerSeries:
 
     exponents: list[Floats]
     """e, each () or (b, 1)."""
-    coefficients: list[Floats]
-    """c_e, each (p, …, b)."""
+    coefficients: Floats
+    """c_e, (E, p, …, b)."""
     remainder: Floats
     """Largest |c_e| / Γ(e + 1) of the first omitted exponents, (…, b)."""
     cut: float
@@ -41,22 +42,16 @@ class PowerSeries:
 
         `order` is a number or (b,). Powers that the Caputo derivative takes to zero are left out.
         """
-        kept = [
-            (e, c[component])
-            for e, c in zip(self.exponents, self.coefficients, strict=True)
-            if not _killed(e, order) and np.any(c[component])
-        ]
-        lead = self.coefficients[0].shape[1:]
-        if not kept:
-            return np.zeros((*lead, len(times)))
-        values = np.stack([c for _, c in kept], axis=-1)
+        kept = [i for i, e in enumerate(self.exponents) if not _killed(e, order)]
+        values = self.coefficients[kept, component]
         shift = np.asarray(order, dtype=np.float64)[..., None]
-        powers = np.stack(np.broadcast_arrays(*[np.atleast_1d(e) - shift for e, _ in kept]), axis=-2)
+        powers = np.stack(np.broadcast_arrays(*[np.atleast_1d(self.exponents[i]) - shift for i in kept]), axis=-2)
         basis = times**powers * rgamma(powers + 1.0)
+        each: Floats
         if basis.ndim == 2:
-            total: Floats = values @ basis
-            return total
-        each: Floats = np.einsum("...be,bet->...bt", values, basis)
+            each = np.tensordot(values, basis, axes=(0, 0))
+        else:
+            each = np.einsum("e...b,bet->...bt", values, basis)
         return each
 
 
@@ -76,7 +71,7 @@ def short_time_series(system: LinearFractionalSystem, y0: Floats, y0_rate: Float
     """
     symbols = _symbols(system)
     present = [{i for i in range(system.size) if np.any(values[..., i])} for values in (y0, y0_rate)]
-    recipe = _recipe(symbols, present, highest)
+    recipe = _cached_recipe(symbols, present, highest)
     lead = y0.shape[:-1]
     entries = [entry for symbol in symbols for entry in symbol.entries.values()] or [np.zeros(())]
     gains = np.stack([np.broadcast_to(entry, lead[-1:]) for entry in entries])
@@ -85,13 +80,12 @@ def short_time_series(system: LinearFractionalSystem, y0: Floats, y0_rate: Float
         coefficients[start] = np.moveaxis(values, -1, 0).reshape(coefficients.shape[1:])
     _apply(recipe.steps, gains, coefficients)
     coefficients = coefficients.reshape(-1, system.size, *lead)
-    kept = [i for i, e in enumerate(recipe.exponents) if np.min(e) <= highest]
-    omitted = [i for i, e in enumerate(recipe.exponents) if np.min(e) > highest]
-    sizes = [float(np.min(recipe.exponents[i])) for i in omitted]
-    remainders = [np.abs(coefficients[i]).max(axis=0) * rgamma(e + 1.0) for i, e in zip(omitted, sizes, strict=True)]
-    remainder = np.max(remainders, axis=0) if remainders else np.zeros(lead)
-    cut = min(sizes, default=highest + 1.0)
-    return PowerSeries([recipe.exponents[i] for i in kept], [coefficients[i] for i in kept], remainder, cut)
+    kept, omitted = recipe.split(highest)
+    remainder = np.zeros(lead)
+    for i in omitted:
+        remainder = np.maximum(remainder, np.abs(coefficients[i]).max(axis=0) * rgamma(recipe.smallest[i] + 1.0))
+    cut = min((recipe.smallest[i] for i in omitted), default=highest + 1.0)
+    return PowerSeries([recipe.exponents[i] for i in kept], coefficients[kept], remainder, cut)
 
 
 @dataclass(frozen=True)
@@ -100,6 +94,35 @@ class _Recipe:
 
     exponents: list[Floats]
     steps: Array
+
+    @cached_property
+    def smallest(self) -> list[float]:
+        """Each exponent, its least value over the members."""
+        return [float(np.min(e)) for e in self.exponents]
+
+    def split(self, highest: float) -> tuple[list[int], list[int]]:
+        """Return which coefficients are kept and which lie beyond `highest`."""
+        kept = [i for i, e in enumerate(self.smallest) if e <= highest]
+        return kept, [i for i, e in enumerate(self.smallest) if e > highest]
+
+
+def _cached_recipe(symbols: list[_Symbol], present: list[set[int]], highest: float) -> _Recipe:
+    if any(symbol.shift.ndim for symbol in symbols):
+        return _recipe(symbols, present, highest)
+    structure = tuple((float(s.shift), float(s.order), tuple(s.entries)) for s in symbols)
+    return _shared_recipe(structure, tuple(frozenset(p) for p in present), highest)
+
+
+@lru_cache(maxsize=256)
+def _shared_recipe(
+    structure: tuple[tuple[float, float, tuple[tuple[int, int], ...]], ...],
+    present: tuple[frozenset[int], ...],
+    highest: float,
+) -> _Recipe:
+    """Return the recipe of members that share their orders."""
+    blank = np.zeros(())
+    symbols = [_Symbol(np.asarray(s), np.asarray(o), dict.fromkeys(places, blank)) for s, o, places in structure]
+    return _recipe(symbols, [set(p) for p in present], highest)
 
 
 def _recipe(symbols: list[_Symbol], present: list[set[int]], highest: float) -> _Recipe:

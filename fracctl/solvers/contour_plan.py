@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 
 from fracctl.arrays import Array, Complexes, Floats
+from fracctl.fractional.terms import powers
 from fracctl.panels import Panel, PanelGrid
 from fracctl.solvers.contour_design import ContourShape, design
 
@@ -19,6 +20,8 @@ SERIES_REACH = 0.012
 SERIES_START = 1e-10
 """First time of the first panel, relative to the horizon: one for all plans, so that grids can be exchanged."""
 SERIES_NODES = 24
+_MOST_CACHED = 16
+"""Sets of orders whose kernels a plan keeps."""
 _LONGEST = 36.0
 """Half-length of a panel times the largest frequency, beyond which a window is split."""
 
@@ -43,27 +46,18 @@ class Window:
     """Their times, (t,)."""
     checked: Array
     """Which of these times compare the two rules."""
-    shift: float
-    """a, the real part that the contour was shifted by."""
-    _kernels: dict[float, tuple[Floats, Floats]] = field(default_factory=dict)
 
-    def kernels(self, exponent: float) -> tuple[Floats, Floats]:
-        """Return real matrices (2N, t) and (2N + 2, checked) that take Z(σ), real parts first, to (σ^e Z)(t)."""
-        if exponent not in self._kernels:
-            if len(self._kernels) > 64:
-                self._kernels.clear()
-            last = 2 * self.nodes + 1
-            powers = np.exp(exponent * np.log(self.path[:last])) * self.weights
-            middle = self._matrix(slice(1, last, 2), powers, self.times)
-            ends = self._matrix(slice(0, last, 2), powers, self.times[self.checked])
-            self._kernels[exponent] = (middle, ends)
-        return self._kernels[exponent]
+    def kernels(self, exponents: tuple[float, ...]) -> tuple[Floats, Floats]:
+        """Return real matrices (2N, E t) and (2N + 2, E c) that take Z(σ), real parts first, to (σ^e Z)(t)."""
+        last = 2 * self.nodes + 1
+        powers = [np.exp(e * np.log(self.path[:last])) * self.weights for e in exponents]
+        middle = [self._matrix(slice(1, last, 2), p, self.times) for p in powers]
+        ends = [self._matrix(slice(0, last, 2), p, self.times[self.checked]) for p in powers]
+        return np.ascontiguousarray(np.hstack(middle)), np.ascontiguousarray(np.hstack(ends))
 
     def _matrix(self, which: slice, powers: Complexes, times: Floats) -> Floats:
-        complex_kernel = powers[which, None] * np.exp(self.path[which, None] * times)
-        matrix = np.empty((2 * len(complex_kernel), len(times)))
-        matrix[: len(complex_kernel)], matrix[len(complex_kernel) :] = complex_kernel.imag, complex_kernel.real
-        return matrix
+        kernel = powers[which, None] * np.exp(self.path[which, None] * times)
+        return np.concatenate([kernel.imag, kernel.real])
 
 
 @dataclass(frozen=True)
@@ -72,11 +66,47 @@ class Plan:
 
     grid: PanelGrid
     windows: tuple[Window, ...]
+    _kernels: dict[tuple[float, ...], list[tuple[Floats, Floats]]] = field(default_factory=dict)
+    _tables: dict[tuple[float, ...], tuple[Floats, Floats]] = field(default_factory=dict)
 
     @property
     def nodes(self) -> int:
         """Nodes at which the transform is evaluated, all windows."""
-        return sum(len(window.path) for window in self.windows)
+        return len(self.path)
+
+    @cached_property
+    def path(self) -> Complexes:
+        """The paths of all windows, one after the other."""
+        return np.concatenate([window.path for window in self.windows])
+
+    @cached_property
+    def layout(self) -> Array:
+        """First node in `path` and number N of midpoint nodes of each window, (windows, 2)."""
+        first = np.cumsum([0, *(len(window.path) for window in self.windows)])[:-1]
+        return np.stack([first, [window.nodes for window in self.windows]], axis=1)
+
+    def kernels(self, exponents: tuple[float, ...]) -> list[tuple[Floats, Floats]]:
+        """Return the kernels of each window for some exponents, from a cache."""
+        if exponents not in self._kernels:
+            if len(self._kernels) >= _MOST_CACHED:
+                self._kernels.clear()
+            self._kernels[exponents] = [window.kernels(exponents) for window in self.windows]
+        return self._kernels[exponents]
+
+    def table(self, exponents: Floats) -> tuple[Floats, Floats]:
+        """Return real and imaginary parts of σ^e along the path, (1, J, P) for (J,) and (b, J, P) for (b, J)."""
+        if exponents.ndim == 2:
+            return _parts(powers(self.path, exponents))
+        key = tuple(exponents.tolist())
+        if key not in self._tables:
+            if len(self._tables) >= _MOST_CACHED:
+                self._tables.clear()
+            self._tables[key] = _parts(powers(self.path, exponents)[None])
+        return self._tables[key]
+
+
+def _parts(values: Complexes) -> tuple[Floats, Floats]:
+    return np.ascontiguousarray(values.real), np.ascontiguousarray(values.imag)
 
 
 @lru_cache(maxsize=64)
@@ -137,4 +167,4 @@ def _window(shape: ContourShape, where: slice, times: Floats, radius: float, shi
     weights = (shape.step / np.pi) * slope[:last] / end
     weights[0] *= 0.5
     checked = np.unique(np.linspace(0, len(times) - 1, 5).astype(int))
-    return Window(shift + sigma / end, weights, shape.nodes, where, times, checked, shift)
+    return Window(shift + sigma / end, weights, shape.nodes, where, times, checked)

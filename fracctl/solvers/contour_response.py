@@ -7,12 +7,13 @@ nodes of a window serves every derivative of every coordinate: D^γ z(t) is a re
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import rgamma
 
-from fracctl.arrays import Array, Booleans, Complexes, Floats
+from fracctl.arrays import Booleans, Complexes, Floats
 from fracctl.characteristic import kernels
 from fracctl.characteristic.matrix import CharacteristicMatrix, stack
 from fracctl.characteristic.winding import crossings
@@ -20,13 +21,13 @@ from fracctl.fractional.series import short_time_series
 from fracctl.fractional.system import LinearFractionalSystem
 from fracctl.fractional.terms import powers
 from fracctl.solvers.contour_kernels import controls_and_errors
-from fracctl.solvers.contour_plan import Plan, Window
+from fracctl.solvers.contour_plan import Plan
 
 SERIES_ORDER = 5.0
 SAFETY = 6.0
 """Estimate over the largest difference seen: the two rules and the times compared are few."""
 Halves = tuple[Floats, Floats]
-"""Z̃ at the odd and at the even nodes of a contour, (k, b, 2N) and (k, b, 2N + 2), real parts first."""
+"""Z̃ at the odd and at the even nodes of all contours, (k, b, Σ 2N) and (k, b, Σ (2N + 2)), real parts first."""
 
 
 @dataclass(frozen=True)
@@ -101,23 +102,52 @@ def _derivatives(
     system: LinearFractionalSystem, y0: Floats, y0_rate: Floats, plan: Plan, orders: list[_Derivative]
 ) -> tuple[Floats, Floats, Floats, Booleans]:
     """Return derivatives on the grid (w, k, b, T), differences (w, k, b, c), values at 0+ (w, k, b, 1), enclosure."""
-    matrix = CharacteristicMatrix(system)
-    k, b, _ = y0.shape
+    k, b, p = y0.shape
     values = np.empty((len(orders), k, b, len(plan.grid.times)))
     differences = np.empty((len(orders), k, b, len(plan.windows) + 1))
     initial = _start(system, y0, y0_rate, plan, orders, values, differences)
-    enclosed = np.ones(b, dtype=bool)
-    for number, window in enumerate(plan.windows):
-        transforms, inside = _transforms(matrix, y0, y0_rate, window)
-        enclosed &= inside
-        for i, wanted in enumerate(orders):
-            transform = transforms[wanted.component]
-            main, ends = _inverse(window, transform, wanted.order, float(system.highest[wanted.component]))
-            checked = np.abs(main[..., window.checked] - ends).max(axis=-1)
-            differences[i, :, :, number + 1] = checked
-            added = _initial_value(wanted, y0, y0_rate, window.times)
-            values[i, :, :, window.where] = main if added is None else main + added
+    transforms, enclosed = _transforms(CharacteristicMatrix(system), y0, y0_rate, plan)
+    for component in range(p):
+        wanted = [i for i, order in enumerate(orders) if order.component == component]
+        for places, exponents, halves in _requests(system, plan, transforms[component], wanted, orders):
+            _invert(plan, exponents, halves, places, values, differences)
+    for i, order in enumerate(orders):
+        added = _initial_value(order, y0, y0_rate, plan.grid.times[plan.windows[0].where.start :])
+        if added is not None:
+            values[i, :, :, plan.windows[0].where.start :] += added
     return values, differences, initial, enclosed
+
+
+def _requests(
+    system: LinearFractionalSystem, plan: Plan, halves: Halves, wanted: list[int], orders: list[_Derivative]
+) -> Iterator[tuple[list[int], tuple[float, ...], Halves]]:
+    """Yield derivatives of one coordinate that share a transform: all with shared orders, each of the others alone."""
+    shared = [i for i in wanted if orders[i].order.ndim == 0]
+    highest = float(system.highest[orders[wanted[0]].component])
+    yield shared, tuple(float(orders[i].order) - highest for i in shared), halves
+    for i in wanted:
+        if orders[i].order.ndim:
+            yield [i], (-highest,), _times_powers(plan, halves, orders[i].order)
+
+
+def _invert(
+    plan: Plan, exponents: tuple[float, ...], halves: Halves, places: list[int], values: Floats, differences: Floats
+) -> None:
+    """Fill in (σ^e Z)(t) on all windows and the largest difference from the other rule at the checked times."""
+    odd, even = halves
+    count, k, b = len(exponents), *odd.shape[:2]
+    at = 0
+    for number, (window, (middle, ends)) in enumerate(zip(plan.windows, plan.kernels(exponents), strict=True)):
+        n = window.nodes
+        main = odd.reshape(k * b, -1)[:, at : at + 2 * n] @ middle
+        start = at + 2 * number
+        other = even.reshape(k * b, -1)[:, start : start + 2 * n + 2] @ ends
+        at += 2 * n
+        main, other = main.reshape(k, b, count, -1), other.reshape(k, b, count, -1)
+        difference = np.abs(main[..., window.checked] - other).max(axis=-1)
+        for j, place in enumerate(places):
+            values[place, :, :, window.where] = main[:, :, j]
+            differences[place, :, :, number + 1] = difference[:, :, j]
 
 
 def _start(
@@ -144,28 +174,25 @@ def _start(
     return initial
 
 
-def _transforms(
-    matrix: CharacteristicMatrix, y0: Floats, y0_rate: Floats, window: Window
-) -> tuple[list[Halves], Booleans]:
-    """Return Z̃ of each coordinate at odd and even nodes, and whether the contour encloses all poles, (b,)."""
+def _transforms(matrix: CharacteristicMatrix, y0: Floats, y0_rate: Floats, plan: Plan) -> tuple[list[Halves], Booleans]:
+    """Return Z̃ of each coordinate at odd and even nodes, and whether all contours enclose all poles, (b,)."""
     k, b, _ = y0.shape
-    n = window.nodes
+    n, w = int(plan.layout[:, 1].sum()), len(plan.windows)
     enclosed = np.ones(b, dtype=bool)
     transforms: dict[int, Halves] = {}
     for block in matrix.blocks():
-        sources = tuple(_source(matrix.system, i, y0, y0_rate, window.path) for i in block)
-        odd, even = np.empty((len(block), k, b, 2 * n)), np.empty((len(block), k, b, 2 * n + 2))
+        sources = tuple(_source(matrix.system, i, y0, y0_rate, plan) for i in block)
+        odd, even = np.empty((len(block), k, b, 2 * n)), np.empty((len(block), k, b, 2 * n + 2 * w))
         if len(block) <= 2:
-            turns, ambiguous, ends = kernels.solve(matrix.tables(block, window.path), sources, n, odd, even)
+            enclosed &= kernels.solve(matrix.tables(block, plan.table), sources, plan.layout, odd, even)
         else:
-            turns, ambiguous, ends = _solve_large(matrix, block, sources, window, odd, even)
-        enclosed &= (turns == 0) & ~ambiguous & (ends[0] > 0.0)
+            enclosed &= _solve_large(matrix, block, sources, plan, odd, even)
         transforms |= {i: (odd[j], even[j]) for j, i in enumerate(block)}
     return [transforms[i] for i in range(matrix.size)], enclosed
 
 
 def _source(
-    system: LinearFractionalSystem, row: int, y0: Floats, y0_rate: Floats, sigma: Complexes
+    system: LinearFractionalSystem, row: int, y0: Floats, y0_rate: Floats, plan: Plan
 ) -> tuple[Floats, Floats, Floats]:
     """Return r_i = Σ_{β>1} A_j σ^(β-2) y'(0) - Σ_{β≤0} A_j σ^(β-1) y(0) as coefficients (k, b, Q) and powers."""
     k, b, _ = y0.shape
@@ -182,35 +209,41 @@ def _source(
             if np.any(coefficient):
                 coefficients.append(np.broadcast_to(coefficient, (k, b)))
                 exponents.append(exponent)
-    columns = np.stack(np.broadcast_arrays(*exponents), axis=-1)
-    basis = powers(sigma, np.atleast_2d(columns))
     merged = np.ascontiguousarray(np.stack(coefficients, axis=-1))
-    return merged, np.ascontiguousarray(basis.real), np.ascontiguousarray(basis.imag)
+    return merged, *plan.table(np.stack(np.broadcast_arrays(*exponents), axis=-1))
 
 
 def _solve_large(
     matrix: CharacteristicMatrix,
     block: list[int],
     sources: tuple[tuple[Floats, Floats, Floats], ...],
-    window: Window,
+    plan: Plan,
     odd: Floats,
     even: Floats,
-) -> tuple[Array, Booleans, Floats]:
+) -> Booleans:
     """Solve three or more coupled coordinates by LAPACK, node by node."""
-    shape = (matrix.batch, len(window.path))
-    entries = [[entry(window.path) if (entry := matrix.entries[i][k]) else None for k in block] for i in block]
+    shape = (matrix.batch, len(plan.path))
+    entries = [[entry(plan.path) if (entry := matrix.entries[i][k]) else None for k in block] for i in block]
     matrices = stack(entries, shape)
-    det = np.linalg.det(matrices)
-    turns, steps = crossings(det)
-    ambiguous: Booleans = steps.sum(axis=1) > 0
     right = np.stack([c @ re + 1j * (c @ im) for c, re, im in (_aligned(source) for source in sources)], axis=-1)
-    last = 2 * window.nodes + 1
-    solution = np.linalg.solve(matrices[:, :last], right[..., :last, :, None])[..., 0]
-    for j in range(len(block)):
-        for out, start in ((odd, 1), (even, 0)):
-            values = solution[..., start::2, j]
-            out[j] = np.concatenate([values.real, values.imag], axis=-1)
-    return turns.astype(np.int64), ambiguous, np.stack([det[:, 0].real, det[:, -1].real])
+    solution = np.linalg.solve(matrices, right[..., None])[..., 0]
+    det = np.linalg.det(matrices)
+    enclosed = np.ones(matrix.batch, dtype=bool)
+    at = 0
+    for number, (first, n) in enumerate(plan.layout):
+        stop = plan.layout[number + 1, 0] if number + 1 < len(plan.layout) else len(plan.path)
+        turns, steps = crossings(det[:, first:stop])
+        enclosed &= (turns == 0.0) & ~steps.any(axis=1) & (det[:, first].real > 0.0)
+        part = np.moveaxis(np.asarray(solution[..., first : first + 2 * n + 1, :], dtype=np.complex128), -1, 0)
+        start = at + 2 * number
+        odd[..., at : at + 2 * n] = _halves(part[..., 1::2])
+        even[..., start : start + 2 * n + 2] = _halves(part[..., 0::2])
+        at += 2 * n
+    return enclosed
+
+
+def _halves(values: Complexes) -> Floats:
+    return np.concatenate([values.real, values.imag], axis=-1)
 
 
 def _aligned(source: tuple[Floats, Floats, Floats]) -> tuple[Floats, Floats, Floats]:
@@ -219,22 +252,18 @@ def _aligned(source: tuple[Floats, Floats, Floats]) -> tuple[Floats, Floats, Flo
     return (c, re[0], im[0]) if len(re) == 1 else (c[..., None, :], re, im)
 
 
-def _inverse(window: Window, transform: Halves, order: Floats, highest: float) -> tuple[Floats, Floats]:
-    """Return (σ^order Z)(t) at the window's times and, by the other rule, at its checked times, (k, b, t)."""
-    odd, even = transform
-    if order.ndim == 0:
-        middle, ends = window.kernels(float(order) - highest)
-        return odd @ middle, even @ ends
-    middle, ends = window.kernels(-highest)
-    sigma = window.path[: 2 * window.nodes + 1]
-    return _times_power(odd, sigma[1::2], order) @ middle, _times_power(even, sigma[0::2], order) @ ends
-
-
-def _times_power(halves: Floats, sigma: Complexes, order: Floats) -> Floats:
-    """Multiply transforms (k, b, 2N), real parts first, by σ^order with one order a member."""
-    n = len(sigma)
-    product = (halves[..., :n] + 1j * halves[..., n:]) * powers(sigma, order)
-    return np.concatenate([product.real, product.imag], axis=-1)
+def _times_powers(plan: Plan, halves: Halves, order: Floats) -> Halves:
+    """Multiply transforms by σ^order with one order a member."""
+    odd, even = (half.copy() for half in halves)
+    at = 0
+    for number, window in enumerate(plan.windows):
+        n = window.nodes
+        sigma = window.path[: 2 * n + 1]
+        for half, start, nodes in ((odd, at, sigma[1::2]), (even, at + 2 * number, sigma[0::2])):
+            re, im = half[..., start : start + len(nodes)], half[..., start + len(nodes) : start + 2 * len(nodes)]
+            half[..., start : start + 2 * len(nodes)] = _halves((re + 1j * im) * powers(nodes, order))
+        at += 2 * n
+    return odd, even
 
 
 def _initial_value(wanted: _Derivative, y0: Floats, y0_rate: Floats, times: Floats) -> Floats | None:

@@ -2,62 +2,50 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
+from typing import Protocol
 
 import numpy as np
 
 from fracctl.arrays import Array, Booleans, Floats
-from fracctl.fractional.system import LinearFractionalSystem
-from fracctl.fractional.terms import FractionalTerm
-from fracctl.panels import PanelGrid
+from fracctl.panels import Panel, PanelGrid
 from fracctl.solvers.base import Survey
-from fracctl.solvers.contour_plan import make_plan
-from fracctl.solvers.contour_response import Response
+from fracctl.solvers.members import Members
 from fracctl.trajectory import Trajectory
 
 
-@dataclass(frozen=True)
-class Members:
-    """Some members of a batch, what they start from and what is known of them."""
+class Response(Protocol):
+    """Values of a group of members on a grid, from k initial states each."""
 
-    system: LinearFractionalSystem
-    y0: Floats
-    """y(0), (k, b, p) or (k, 1, p)."""
-    rate: Floats
-    """y'(0), as y0."""
-    horizon: float
-    every: bool
-    """Whether unstable members want a trajectory and all members rates."""
-    rows: Array = field(default_factory=lambda: np.zeros(0, dtype=np.intp))
-    """Numbers of the members in the whole batch, (b,)."""
-    stable: Array = field(default_factory=lambda: np.zeros(0, dtype=object))
-    """Verdicts, (b,), once known."""
+    @property
+    def positions(self) -> Floats:
+        """ξ, (k, b, m, T)."""
+        ...
 
-    def take(self, which: Array) -> Members:
-        """Return some of the members; orders they share lose their batch axis."""
-        return replace(
-            self,
-            system=_with_shared_orders(self.system.take(which)),
-            y0=self.y0[:, which] if self.y0.shape[1] > 1 else self.y0,
-            rate=self.rate[:, which] if self.rate.shape[1] > 1 else self.rate,
-            rows=self.rows[which] if self.rows.size else which,
-            stable=self.stable[which] if self.stable.size else self.stable,
-        )
+    @property
+    def rates(self) -> Floats | None:
+        """ξ', (k, b, m, T), or None."""
+        ...
 
-    def initial_states(self) -> Floats:
-        """Return [ξ(0), ξ'(0), z(0)], (k, b, n)."""
-        m = self.system.n_positions
-        start = np.concatenate([self.y0[..., :m], self.rate[..., :m], self.y0[..., m:]], axis=-1)
-        return np.broadcast_to(start, (len(start), len(self.rows), start.shape[-1]))
+    @property
+    def auxiliary(self) -> Floats:
+        """z, (k, b, q, T)."""
+        ...
 
+    @property
+    def controls(self) -> Floats:
+        """υ, (k, b, m, T)."""
+        ...
 
-def _with_shared_orders(system: LinearFractionalSystem) -> LinearFractionalSystem:
-    def shared(term: FractionalTerm) -> FractionalTerm:
-        equal = term.orders.ndim == 2 and np.all(term.orders == term.orders[:1])
-        return FractionalTerm(term.matrix, term.orders[0]) if equal else term
+    @property
+    def initial_controls(self) -> Floats:
+        """υ(0+), (k, b, m)."""
+        ...
 
-    dynamics, control = (tuple(shared(term) for term in terms) for terms in (system.dynamics, system.control))
-    return replace(system, dynamics=dynamics, control=control)
+    @property
+    def error(self) -> Floats:
+        """Estimated error of positions and controls over their peaks, (k, b)."""
+        ...
 
 
 def packed(
@@ -95,7 +83,7 @@ def without_trajectory(members: Members, status: str) -> Survey:
     start = members.initial_states()
     k, b, _ = start.shape
     m, q = members.system.n_positions, members.system.n_auxiliary
-    grid = make_plan(members.horizon, 1.0, 1.0, 0.0, 1e-6).grid
+    grid = PanelGrid([Panel(0.0, members.horizon, 4)])
     blank = np.full((k * b, m, len(grid.times)), np.nan)
     trajectory = Trajectory(
         grid=grid,
