@@ -1,0 +1,132 @@
+"""What the solvers of batches share: shapes, verdicts, groups of equal orders, one grid for all."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fracctl.arrays import Array, Floats, finite
+from fracctl.characteristic.bounds import pole_radius
+from fracctl.characteristic.matrix import CharacteristicMatrix
+from fracctl.characteristic.winding import abscissa_bound, unstable_zeros
+from fracctl.errors import UnsupportedError
+from fracctl.fractional.system import LinearFractionalSystem
+from fracctl.loop import ClosedLoop
+from fracctl.solvers.base import Survey
+from fracctl.solvers.members import Members, common_batch, equal_orders, positive
+from fracctl.solvers.results import merged, without_trajectory
+from fracctl.trajectory import Trajectory
+
+_LARGEST_GROWTH = 200.0
+"""Exponent of growth over the horizon beyond which an unstable trajectory is given up as diverged."""
+
+
+class BatchSolver(ABC):
+    """A solver of linear fractional loops that solves groups of members together.
+
+    A stability verdict comes with every member: the number of zeros in the right half plane, by the argument principle.
+    """
+
+    name: str
+    fewest_shared = 1
+    """Members with equal orders that are worth a group of their own; fewer are solved together."""
+
+    def supports(self, loop: ClosedLoop) -> str | None:
+        """Return None for a linear fractional loop, otherwise why it is refused and what to use instead."""
+        system = getattr(loop, "system", None)
+        if isinstance(system, LinearFractionalSystem):
+            return self._refusal(system)
+        return f"the {self.name} solver takes linear loops only; use 'method_of_steps' for nonlinear or delayed ones"
+
+    def solve(self, loop: ClosedLoop, initial_state: ArrayLike, horizon: float) -> Trajectory:
+        """Return the trajectories of all members on one grid.
+
+        Args:
+            loop: the closed loop, of b members or a single one.
+            initial_state: [ξ(0), ξ'(0)], (n,), or (b, n) one a member.
+            horizon: S > 0, the last time.
+
+        Raises:
+            ArgumentError: a shape does not fit, or the horizon is not positive.
+            UnsupportedError: the solver does not take the loop, or not over so long a horizon.
+        """
+        self._check(loop)
+        state = finite("initial_state", initial_state)
+        y0, rate = loop.initial_values(state)
+        batch = common_batch(loop.batch, len(state) if state.ndim == 2 else None)
+        system = replace(loop.system, batch=batch)
+        y0, rate = (np.broadcast_to(v, (1, batch, v.shape[-1])) for v in (y0, rate))
+        parts = list(self._groups(Members(system, y0, rate, positive("horizon", horizon), every=True)))
+        return replace(merged(parts, batch), batched=loop.batch is not None or state.ndim == 2)
+
+    def survey(self, loop: ClosedLoop, initial_states: ArrayLike, horizon: float) -> Iterator[Survey]:
+        """Yield members group by group, each from all k initial states (k, n); unstable ones without trajectory."""
+        self._check(loop)
+        y0, rate = loop.initial_values(np.atleast_2d(finite("initial_states", initial_states)))
+        system = replace(loop.system, batch=loop.batch or 1)
+        yield from self._groups(Members(system, y0[:, None], rate[:, None], positive("horizon", horizon), every=False))
+
+    def _check(self, loop: ClosedLoop) -> None:
+        refusal = self.supports(loop)
+        if refusal:
+            raise UnsupportedError(refusal)
+
+    def _groups(self, everyone: Members) -> Iterator[Survey]:
+        """Split the members by orders, tell the unstable apart and solve the rest."""
+        for which in equal_orders(everyone.system, self.fewest_shared):
+            members = everyone.take(which)
+            matrix = CharacteristicMatrix(members.system)
+            zeros, marginal = unstable_zeros(matrix)
+            stable = (zeros == 0.0).astype(object)
+            stable[marginal] = None
+            members = replace(members, stable=stable)
+            unstable = ~marginal & (zeros > 0.0)
+            shift = np.zeros(len(which))
+            if members.every and unstable.any():
+                shift[unstable] = _growth(matrix.take(np.flatnonzero(unstable)), members.horizon)
+            given_up = shift * members.horizon > _LARGEST_GROWTH if members.every else unstable
+            if given_up.any():
+                word = "diverged" if members.every else "unstable"
+                yield without_trajectory(members.take(np.flatnonzero(given_up)), word)
+            yield from self._solved(members, np.flatnonzero(~given_up), pole_radius(matrix), shift)
+
+    def _refusal(self, system: LinearFractionalSystem) -> str | None:
+        """Return why a linear loop is refused, or None."""
+        margin = order_margin(system)
+        if margin > 0.0:
+            return None
+        return (
+            f"the {self.name} solver takes terms of an order below the highest one of their coordinate (2 for positions,"
+            f" 1 for auxiliary states), but one lies {-margin:g} above; solve the equation for its highest derivatives"
+        )
+
+    @abstractmethod
+    def _solved(self, members: Members, rows: Array, radius: Floats, shift: Floats) -> Iterator[Survey]:
+        """Solve `rows` of the members.
+
+        Args:
+            members: members that share their orders, or too few to be worth it.
+            rows: which of them.
+            radius: bounds on the magnitudes of their poles.
+            shift: bounds on the real parts of the poles of unstable members that want a trajectory, 0 for others.
+        """
+
+
+def order_margin(system: LinearFractionalSystem) -> float:
+    """Return by how much, at least, the orders of all terms but the first lie below the highest of their column."""
+    margins = [
+        float(np.min((system.highest - term.orders)[..., used]))
+        for term in system.dynamics[1:]
+        if np.any(used := term.matrix.reshape(-1, system.size).any(axis=0))
+    ]
+    return min(margins, default=np.inf)
+
+
+def _growth(matrix: CharacteristicMatrix, horizon: float) -> Floats:
+    """Bound the real parts of the poles from above, rounded to whole multiples of 1/horizon."""
+    growth: Floats = np.ceil(abscissa_bound(matrix, 1.0 / horizon) * horizon) / horizon
+    return growth
