@@ -100,8 +100,9 @@ class BatchSolver(ABC):
         if margin > 0.0:
             return None
         return (
-            f"the {self.name} solver takes terms of an order below the highest one of their coordinate (2 for positions,"
-            f" 1 for auxiliary states), but one lies {-margin:g} above; solve the equation for its highest derivatives"
+            f"the {self.name} solver takes terms of an order below the highest of their coordinate (2 for positions,"
+            f" 1 for auxiliary states), but one is {-margin + 0.0:g} above it; solve the equation for its highest"
+            " derivatives"
         )
 
     @abstractmethod

@@ -1,0 +1,97 @@
+"""Members of a batch of loops: what they start from, and which of them share their orders."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from fracctl.arrays import Array, Floats, finite
+from fracctl.errors import ArgumentError
+from fracctl.fractional.system import LinearFractionalSystem
+from fracctl.fractional.terms import FractionalTerm
+
+
+@dataclass(frozen=True)
+class Members:
+    """Some members of a batch, what they start from and what is known of them."""
+
+    system: LinearFractionalSystem
+    y0: Floats
+    """y(0), (k, b, p) or (k, 1, p)."""
+    rate: Floats
+    """y'(0), as y0."""
+    horizon: float
+    every: bool
+    """Whether unstable members want a trajectory and all members rates."""
+    rows: Array = field(default_factory=lambda: np.zeros(0, dtype=np.intp))
+    """Numbers of the members in the whole batch, (b,)."""
+    stable: Array = field(default_factory=lambda: np.zeros(0, dtype=object))
+    """Verdicts, (b,), once known."""
+
+    def take(self, which: Array) -> Members:
+        """Return some of the members; orders they share lose their batch axis."""
+        return replace(
+            self,
+            system=_with_shared_orders(self.system.take(which)),
+            y0=self.y0[:, which] if self.y0.shape[1] > 1 else self.y0,
+            rate=self.rate[:, which] if self.rate.shape[1] > 1 else self.rate,
+            rows=self.rows[which] if self.rows.size else which,
+            stable=self.stable[which] if self.stable.size else self.stable,
+        )
+
+    def initial_states(self) -> Floats:
+        """Return [ξ(0), ξ'(0), z(0)], (k, b, n)."""
+        m = self.system.n_positions
+        start = np.concatenate([self.y0[..., :m], self.rate[..., :m], self.y0[..., m:]], axis=-1)
+        return np.broadcast_to(start, (len(start), len(self.rows), start.shape[-1]))
+
+
+def _with_shared_orders(system: LinearFractionalSystem) -> LinearFractionalSystem:
+    def shared(term: FractionalTerm) -> FractionalTerm:
+        equal = term.orders.ndim == 2 and np.all(term.orders == term.orders[:1])
+        return FractionalTerm(term.matrix, term.orders[0]) if equal else term
+
+    dynamics, control = (tuple(shared(term) for term in terms) for terms in (system.dynamics, system.control))
+    return replace(system, dynamics=dynamics, control=control)
+
+
+def equal_orders(system: LinearFractionalSystem, fewest: int) -> Iterator[Array]:
+    """Yield groups of members: those that share all orders, and together all that share them with too few.
+
+    Args:
+        system: the batch.
+        fewest: number of members with equal orders that are worth a group of their own.
+    """
+    batch = system.batch or 1
+    own = [term.orders for term in (*system.dynamics, *system.control) if term.orders.ndim == 2]
+    if not own:
+        yield np.arange(batch)
+        return
+    table = np.concatenate([np.broadcast_to(o, (batch, o.shape[-1])) for o in own], axis=1)
+    _, which = np.unique(table, axis=0, return_inverse=True)
+    which = which.ravel()
+    counts = np.bincount(which)
+    few = counts[which] < fewest
+    if few.any():
+        yield np.flatnonzero(few)
+    for value in np.flatnonzero(counts >= fewest):
+        yield np.flatnonzero(which == value)
+
+
+def common_batch(loop: int | None, states: int | None) -> int:
+    """Return the batch size that a loop and its initial states have together."""
+    sizes = {size for size in (loop, states) if size is not None and size != 1}
+    if len(sizes) > 1:
+        allowed = f"must have the batch size of the loop, {loop}"
+        raise ArgumentError("initial_state", f"a batch of {states}", allowed)
+    return sizes.pop() if sizes else 1
+
+
+def positive(name: str, value: float) -> float:
+    """Return a finite positive number, or refuse it."""
+    number = float(finite(name, value))
+    if number <= 0.0:
+        raise ArgumentError(name, number, "must be positive")
+    return number
