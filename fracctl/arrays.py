@@ -27,6 +27,14 @@ def finite(name: str, value: ArrayLike) -> Floats:
     return array
 
 
+def share(name: str, value: float) -> float:
+    """Return a number in [0, 1]; raise ArgumentError for others."""
+    number = float(finite(name, value))
+    if not 0.0 <= number <= 1.0:
+        raise ArgumentError(name, number, "must lie in [0, 1]")
+    return number
+
+
 def matrices(name: str, value: ArrayLike, rows: int) -> Floats:
     """Return gains as (b, rows, rows) or (rows, rows), checking the shape.
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from fracctl.errors import RunError
 from fracctl.evaluation import COUNTERS
+from fracctl.execution.cross_check import CrossCheck
 from fracctl.execution.drawing import draw_figures
 from fracctl.execution.executors import make_executor, n_workers
 from fracctl.execution.progress import Progress
@@ -102,20 +103,21 @@ class Computation:
 
     def _compute(self) -> dict[str, Any]:
         store = self._evaluate()
-        tally, optima = self._tables(store)
+        tally, optima, check = self._tables(store)
         self._trajectories()
         found = results(self._evaluation, optima)
         notes = self._notes + notes_on(found, self._survey.baseline, tally)
         if store.damaged:
             notes.append(f"stored parts that could not be trusted and were computed again: {store.damaged}")
         notes += notes_on_tails(self._evaluation, found)
+        notes += check.notes()
         notes += draw_figures(self._directory, self._job.configuration["figures"])
         identity = {
             "experiment": str(self._job.configuration["name"]),
             "run_id": self._directory.path.name,
             "run_directory": str(self._directory.path),
         }
-        return summarise(identity, store, found, notes)
+        return summarise(identity, store, found, notes) | check.summary()
 
     def _evaluate(self) -> RowStore:
         store = RowStore(self._directory, self._evaluation, evaluations_schema(self._evaluation, self._metadata))
@@ -136,8 +138,8 @@ class Computation:
             raise RunError(f"every point failed: {next(iter(store.failures.values()), 'there is none')}")
         return store
 
-    def _tables(self, store: RowStore) -> tuple[Tally, list[dict[str, Any]]]:
-        """Join the parts, select the optima, and return them."""
+    def _tables(self, store: RowStore) -> tuple[Tally, list[dict[str, Any]], CrossCheck]:
+        """Join the parts, select the optima, check a share of the rows and the optima by another solver."""
         evaluation = self._evaluation
         table = evaluations_schema(evaluation, self._metadata)
         self._directory.write_evaluations(table, store.tables())
@@ -145,13 +147,16 @@ class Computation:
         selection = Optima(
             evaluation.objectives, evaluation.design_variables, self._survey.slice, self._survey.baseline
         )
+        check = CrossCheck(evaluation, int(self._job.configuration["seed"]))
         for rows in self._directory.stream_evaluations():
             tally.add(rows)
             selection.add(rows)
+            check.add(rows)
         optima = selection.rows()
+        check.add_optima(optima)
         columns = ("kind", "slice", "objective_name", *table.names)
         self._directory.write_optima(schema(columns, COUNTERS, self._metadata), optima)
-        return tally, optima
+        return tally, optima, check
 
     def _trajectories(self) -> None:
         optima = self._directory.optima()

@@ -26,6 +26,12 @@ class Solver(Protocol):
     """A way to trajectories of a closed loop."""
 
     name: str
+    tolerance: float
+    """Error it is asked to keep, relative to the peaks; 0 where it cannot be asked."""
+    cross_check: float
+    """Share of a survey's rows that another solver computes too."""
+    checked_by: str
+    """Name of that solver."""
 
     def supports(self, loop: ClosedLoop) -> str | None:
         """Return None, or one sentence that says why the loop is refused and what to use instead."""

@@ -32,6 +32,9 @@ class BatchSolver(ABC):
     """
 
     name: str
+    tolerance: float = 0.0
+    cross_check: float = 0.0
+    checked_by: str = "contour"
     fewest_shared = 1
     """Members with equal orders that are worth a group of their own; fewer are solved together."""
 

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fracctl.arrays import Array, Floats
+from fracctl.arrays import Array, Floats, share
 from fracctl.errors import ArgumentError, UnsupportedError
 from fracctl.solvers.base import Survey
 from fracctl.solvers.batched import BatchSolver
@@ -64,18 +64,20 @@ class Contour(BatchSolver):
 
     Args:
         tolerance: largest error of positions and controls relative to their peaks, in [1e-11, 1e-3].
+        cross_check: share of a survey's rows that the Volterra solver computes too, in [0, 1].
 
     Raises:
-        ArgumentError: the tolerance lies outside its range.
+        ArgumentError: an argument lies outside its range.
     """
 
     name = "contour"
+    checked_by = "volterra"
     fewest_shared = 8
 
-    def __init__(self, tolerance: float = 1e-8) -> None:
+    def __init__(self, tolerance: float = 1e-8, cross_check: float = 0.0) -> None:
         if not 1e-11 <= tolerance <= 1e-3:
             raise ArgumentError("tolerance", tolerance, "must lie in [1e-11, 1e-3]")
-        self.tolerance = float(tolerance)
+        self.tolerance, self.cross_check = float(tolerance), share("cross_check", cross_check)
 
     def _solved(self, members: Members, rows: Array, radius: Floats, shift: Floats) -> Iterator[Survey]:
         """Solve `rows`; those that miss the tolerance again, the last time as they come out."""

@@ -6,10 +6,22 @@ from numpy.typing import ArrayLike
 
 from fracctl.errors import ArgumentError, UnsupportedError, suggestion
 from fracctl.loop import ClosedLoop
+from fracctl.solvers.base import Solver
 from fracctl.solvers.contour import Contour
 from fracctl.trajectory import Trajectory
 
 _SOLVERS = {Contour.name: Contour}
+
+
+def make_solver(name: str) -> Solver:
+    """Return a solver with its default options.
+
+    Raises:
+        ArgumentError: there is no solver of this name.
+    """
+    if name not in _SOLVERS:
+        raise ArgumentError("solver", repr(name), f"must be one of {sorted(_SOLVERS)}{suggestion(name, _SOLVERS)}")
+    return _SOLVERS[name]()
 
 
 def solve(

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from fracctl.plants import LinearPlant
+from fracctl.solvers import Contour
 
 
 class FakeEvaluation:
@@ -38,6 +39,7 @@ class FakeEvaluation:
     horizon = 10.0
     plant = LinearPlant(-1.0, components=("w",))
     measures = ()
+    solver = Contour()
 
     def __init__(self, data: Mapping[str, Any]) -> None:
         self.initial_conditions = {name: np.ones(2) for name in data.get("initial_conditions", ["one", "two"])}
