@@ -213,13 +213,13 @@ def _followed(d_re: Floats, d_im: Floats, factor_re: Floats, factor_im: Floats) 
         d_re[n] = x * factor_re[n] - y * factor_im[n]
         d_im[n] = x * factor_im[n] + y * factor_re[n]
     turns, doubtful = _turns(d_re, d_im)
-    before = 0.0
+    size = abs(d_re[0]) + abs(d_im[0])
+    change, room = 0.0, np.inf
     for n in range(length - 1):
-        change = np.hypot(d_re[n + 1] - d_re[n], d_im[n + 1] - d_im[n])
-        size = np.hypot(d_re[n], d_im[n]) + np.hypot(d_re[n + 1], d_im[n + 1])
-        if max(change, before) > LARGEST_CHANGE * size:
+        following = abs(d_re[n + 1]) + abs(d_im[n + 1])
+        step = abs(d_re[n + 1] - d_re[n]) + abs(d_im[n + 1] - d_im[n])
+        here = LARGEST_CHANGE * (size + following)
+        if max(step, change) > here or step > room:
             doubtful = True
-        if n > 0 and change > LARGEST_CHANGE * (np.hypot(d_re[n - 1], d_im[n - 1]) + np.hypot(d_re[n], d_im[n])):
-            doubtful = True
-        before = change
+        size, change, room = following, step, here
     return turns, doubtful, d_re[length - 1]

@@ -123,11 +123,12 @@ def _counted(values: Complexes) -> tuple[Floats, Booleans]:
     trace in than the rate at which the magnitude changes around it.
     """
     turns, ambiguous = crossings(values)
-    change = np.abs(np.diff(values, axis=1))
+    difference = np.diff(values, axis=1)
+    change = np.abs(difference.real) + np.abs(difference.imag)
     around = change.copy()
     around[:, 1:] = np.maximum(around[:, 1:], change[:, :-1])
     around[:, :-1] = np.maximum(around[:, :-1], change[:, 1:])
-    size = np.abs(values)
+    size = np.abs(values.real) + np.abs(values.imag)
     doubtful = around > LARGEST_CHANGE * (size[:, 1:] + size[:, :-1])
     counted = crossings(values, doubtful)[0] if doubtful.any() else turns
     return counted, ambiguous | doubtful

@@ -28,8 +28,8 @@ _Key = tuple[int, tuple[tuple[int, int], ...]]
 class PowerSeries:
     """y_k = Σ_e c_e t^e / Γ(e + 1) up to an exponent, for a batch."""
 
-    exponents: list[Floats]
-    """e, each () or (b, 1)."""
+    exponents: Floats
+    """e, (E,), or (E, b) where members have orders of their own; the first two are 0 and 1."""
     coefficients: Floats
     """c_e, (E, p, …, b)."""
     remainder: Floats
@@ -42,25 +42,23 @@ class PowerSeries:
 
         `order` is a number or (b,). Powers that the Caputo derivative takes to zero are left out.
         """
-        kept = [i for i, e in enumerate(self.exponents) if not _killed(e, order)]
-        values = self.coefficients[kept, component]
-        shift = np.asarray(order, dtype=np.float64)[..., None]
-        powers = np.stack(np.broadcast_arrays(*[np.atleast_1d(self.exponents[i]) - shift for i in kept]), axis=-2)
-        basis = times**powers * rgamma(powers + 1.0)
+        first = 2 if np.min(order) > 1.0 else 1 if np.min(order) > 0.0 else 0
+        values = self.coefficients[first:, component]
+        powers = self.exponents[first:] - order if self.exponents.ndim == 1 and np.ndim(order) == 0 else None
         each: Floats
-        if basis.ndim == 2:
-            each = np.tensordot(values, basis, axes=(0, 0))
-        else:
-            each = np.einsum("e...b,bet->...bt", values, basis)
+        if powers is not None:
+            each = np.tensordot(values, times ** powers[:, None] * rgamma(powers[:, None] + 1.0), axes=(0, 0))
+            return each
+        exponents = self.exponents if self.exponents.ndim == 2 else self.exponents[:, None]
+        own = (exponents[first:] - order)[..., None]
+        each = np.einsum("e...b,ebt->...bt", values, times**own * rgamma(own + 1.0))
         return each
 
 
-def _killed(exponent: Floats, order: float | Floats) -> bool:
-    """Whether the Caputo derivative takes t^e to zero: 1 for order > 0, t for order > 1."""
-    if exponent.ndim:
-        return False
-    smallest = np.min(order)
-    return bool((exponent == 0.0 and smallest > 0.0) or (exponent == 1.0 and smallest > 1.0))
+def _killed(key: _Key, order: Floats) -> bool:
+    """Whether the Caputo derivative takes the power to zero: y(0) for order > 0, y'(0) t for order > 1."""
+    start, counts = key
+    return not counts and bool(np.min(order) > start)
 
 
 def short_time_series(system: LinearFractionalSystem, y0: Floats, y0_rate: Floats, highest: float) -> PowerSeries:
@@ -85,20 +83,22 @@ def short_time_series(system: LinearFractionalSystem, y0: Floats, y0_rate: Float
     for i in omitted:
         remainder = np.maximum(remainder, np.abs(coefficients[i]).max(axis=0) * rgamma(recipe.smallest[i] + 1.0))
     cut = min((recipe.smallest[i] for i in omitted), default=highest + 1.0)
-    return PowerSeries([recipe.exponents[i] for i in kept], coefficients[kept], remainder, cut)
+    return PowerSeries(recipe.exponents[kept], coefficients[kept], remainder, cut)
 
 
 @dataclass(frozen=True)
 class _Recipe:
     """Which coefficient feeds which: rows (target, source, row, column, entry), and the exponents in order."""
 
-    exponents: list[Floats]
+    exponents: Floats
+    """(E,) or (E, b)."""
     steps: Array
 
     @cached_property
     def smallest(self) -> list[float]:
         """Each exponent, its least value over the members."""
-        return [float(np.min(e)) for e in self.exponents]
+        least: list[float] = self.exponents.reshape(len(self.exponents), -1).min(axis=1).tolist()
+        return least
 
     def split(self, highest: float) -> tuple[list[int], list[int]]:
         """Return which coefficients are kept and which lie beyond `highest`."""
@@ -144,7 +144,7 @@ def _recipe(symbols: list[_Symbol], present: list[set[int]], highest: float) -> 
             if np.min(e) > highest:
                 continue
             for entry, (number, (row, column)) in enumerate(places):
-                if column not in present[index[key]] or _killed(e, symbols[number].order):
+                if column not in present[index[key]] or _killed(key, symbols[number].order):
                     continue
                 new = _extended(key, number)
                 if new not in index:
@@ -156,7 +156,8 @@ def _recipe(symbols: list[_Symbol], present: list[set[int]], highest: float) -> 
                 steps.append((index[new], index[key], row, column, entry))
         level = following
         if not level:
-            return _Recipe(exponents, np.array(steps, dtype=np.int64).reshape(-1, 5))
+            table = np.stack(np.broadcast_arrays(*exponents))
+            return _Recipe(table, np.array(steps, dtype=np.int64).reshape(-1, 5))
     raise UnsupportedError(
         "an order of the loop lies too near the highest order of its equation, so that the powers of its"
         " short-time solution are too dense; lower the order or drop the term"
@@ -204,7 +205,7 @@ def _exponent(key: _Key, symbols: list[_Symbol]) -> Floats:
     total = np.asarray(float(start))
     for number, count in counts:
         shift = symbols[number].shift
-        total = total + count * (shift[:, None] if shift.ndim else shift)
+        total = total + count * shift
     return total
 
 

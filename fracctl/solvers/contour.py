@@ -37,14 +37,16 @@ class _Attempt:
     """How contours are laid out: wider and with a finer rule each time."""
 
     width: float
-    """Height of the contours over the bound on the poles' imaginary parts."""
+    """Height of the contours over the bound on the poles' imaginary parts, for a single coordinate."""
+    coupled: float
+    """The same for several, where the bound is a norm and generous."""
     safety: float
     """Tolerance of the rule over that of the solver."""
     ratio: float
     """Pole radii within this factor share a contour."""
 
 
-_ATTEMPTS = (_Attempt(1.0, 0.03, 1.25), _Attempt(1.1, 0.003, 1.5), _Attempt(1.5, 0.001, 1.5))
+_ATTEMPTS = (_Attempt(1.0, 0.6, 0.05, 1.25), _Attempt(1.1, 1.1, 0.003, 1.5), _Attempt(1.5, 1.5, 0.001, 1.5))
 
 
 @dataclass(frozen=True)
@@ -87,7 +89,7 @@ class Contour(BatchSolver):
             for group in _classes(rows, radius, shift, attempt.ratio, max(_CHUNK // len(members.y0), 1)):
                 tolerance = max(attempt.safety * self.tolerance, _SMALLEST_TOLERANCE)
                 try:
-                    hull = attempt.width * group.radius
+                    hull = group.radius * (attempt.width if members.system.size == 1 else attempt.coupled)
                     plan = make_plan(members.horizon, hull, group.radius, group.shift, tolerance)
                 except UnsupportedError:
                     if members.every:

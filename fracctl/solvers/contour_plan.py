@@ -15,7 +15,7 @@ from fracctl.solvers.contour_design import ContourShape, design
 
 RATIOS = (3.0, 4.0, 5.0, 6.0, 7.0, 8.0)
 """Last over first time of a window; few values, so that few contours are designed."""
-SERIES_REACH = 0.012
+SERIES_REACH = 0.035
 """Time, times the pole radius, up to which the solution is taken from its power series."""
 SERIES_START = 1e-10
 """First time of the first panel, relative to the horizon: one for all plans, so that grids can be exchanged."""

@@ -23,7 +23,7 @@ from fracctl.fractional.terms import powers
 from fracctl.solvers.contour_kernels import controls_and_errors
 from fracctl.solvers.contour_plan import Plan
 
-SERIES_ORDER = 5.0
+SERIES_ORDER = 6.0
 SAFETY = 6.0
 """Estimate over the largest difference seen: the two rules and the times compared are few."""
 Halves = tuple[Floats, Floats]
@@ -196,7 +196,8 @@ def _source(
 ) -> tuple[Floats, Floats, Floats]:
     """Return r_i = Σ_{β>1} A_j σ^(β-2) y'(0) - Σ_{β≤0} A_j σ^(β-1) y(0) as coefficients (k, b, Q) and powers."""
     k, b, _ = y0.shape
-    coefficients, exponents = [np.zeros((k, b))], [np.zeros(())]
+    coefficients: list[Floats] = []
+    exponents: list[Floats] = []
     for term in system.dynamics:
         for column in np.flatnonzero(term.matrix[..., row, :].reshape(-1, system.size).any(axis=0)):
             order = term.orders[..., column]
@@ -209,6 +210,8 @@ def _source(
             if np.any(coefficient):
                 coefficients.append(np.broadcast_to(coefficient, (k, b)))
                 exponents.append(exponent)
+    if not coefficients:
+        coefficients, exponents = [np.zeros((k, b))], [np.zeros(())]
     merged = np.ascontiguousarray(np.stack(coefficients, axis=-1))
     return merged, *plan.table(np.stack(np.broadcast_arrays(*exponents), axis=-1))
 
