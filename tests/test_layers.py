@@ -34,6 +34,7 @@ BOTTOM_UP = (
     "figures",
     "report",
     "execution",
+    "reproduction",
     "cli",
 )
 """Figures and the report read the store only; a run in `execution` draws them at its end."""

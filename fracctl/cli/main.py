@@ -6,12 +6,18 @@ import sys
 from collections.abc import Sequence
 from types import ModuleType
 
-from fracctl.cli import listing, output, run, show, validate
+from fracctl.cli import listing, output, reproduce, run, show, validate
 from fracctl.cli.failure import report
 from fracctl.errors import UsageError, suggestion
 
 INTERRUPTED = 130
-COMMANDS: dict[str, ModuleType] = {"run": run, "list": listing, "show": show, "validate": validate}
+COMMANDS: dict[str, ModuleType] = {
+    "run": run,
+    "reproduce": reproduce,
+    "list": listing,
+    "show": show,
+    "validate": validate,
+}
 
 _HELP = """\
 usage: fracctl COMMAND [OPTION …] [OVERRIDE …]
@@ -31,7 +37,8 @@ a first run:
   fracctl run experiment=ic1_outofplane      the best gains and order from IC1, stored and drawn in seconds
   fracctl show experiment=ic1_outofplane     what that computes, in words and units
 
-exit codes: 0 done, 1 a run failed, 2 wrong command line, 3 wrong configuration, 130 interrupted
+exit codes: 0 done, 1 a run failed or a published number does not come out as it must, 2 wrong command line,
+            3 wrong configuration, 130 interrupted
 """
 
 

@@ -45,7 +45,7 @@ def test_plain_data_give_the_same_configuration(words: list[str]) -> None:
 
 
 def test_defaults_are_written_out() -> None:
-    assert plain("measures.control_effort=null")["measures"]["control_effort"] == {}
+    assert plain("measures.control_effort=null")["measures"]["control_effort"] == {"resolution": None}
     assert plain("~measures.overshoot.scale")["measures"]["overshoot"]["scale"] == 1e4
 
 
