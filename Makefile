@@ -32,7 +32,7 @@ bench: $(VENV)/installed
 	$(BIN)/python benchmarks/survey_rate.py
 
 reproduce: $(VENV)/installed
-	$(BIN)/fracctl run experiment=outofplane
+	$(BIN)/fracctl reproduce
 
 docs: $(VENV)/installed-docs
 	$(BIN)/sphinx-build -W -q docs docs/_build
