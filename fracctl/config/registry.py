@@ -28,7 +28,11 @@ BUILT_IN: Mapping[str, Mapping[str, str]] = {
         "linear": "fracctl.plants:LinearPlant",
     },
     "controllers": {"pd": "fracctl.controllers.pd:PD", "pd_alpha": "fracctl.controllers:PDAlpha"},
-    "solvers": {"contour": "fracctl.solvers:Contour"},
+    "solvers": {
+        "contour": "fracctl.solvers:Contour",
+        "volterra": "fracctl.solvers:Volterra",
+        "collocation": "fracctl.solvers:Collocation",
+    },
     "measures": {
         "settling_time": "fracctl.measures:SettlingTime",
         "overshoot": "fracctl.measures:Overshoot",

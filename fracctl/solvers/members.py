@@ -95,3 +95,10 @@ def positive(name: str, value: float) -> float:
     if number <= 0.0:
         raise ArgumentError(name, number, "must be positive")
     return number
+
+
+def whole(name: str, value: object, lowest: int, highest: int) -> int:
+    """Return a whole number of a range, or refuse it."""
+    if not (isinstance(value, int | np.integer) and lowest <= value <= highest):
+        raise ArgumentError(name, value, f"must be a whole number from {lowest} to {highest}")
+    return int(value)

@@ -4,24 +4,28 @@ from __future__ import annotations
 
 from numpy.typing import ArrayLike
 
-from fracctl.errors import ArgumentError, UnsupportedError, suggestion
+from fracctl.errors import ArgumentError, suggestion
 from fracctl.loop import ClosedLoop
-from fracctl.solvers.base import Solver
+from fracctl.solvers.batched import BatchSolver
+from fracctl.solvers.collocation import Collocation
 from fracctl.solvers.contour import Contour
+from fracctl.solvers.volterra import Volterra
 from fracctl.trajectory import Trajectory
 
-_SOLVERS = {Contour.name: Contour}
+_SOLVERS: dict[str, type[Collocation | Contour | Volterra]] = {
+    solver.name: solver for solver in (Contour, Volterra, Collocation)
+}
 
 
-def make_solver(name: str) -> Solver:
-    """Return a solver with its default options.
+def make_solver(name: str, tolerance: float | None = None) -> BatchSolver:
+    """Return a solver with its default options, or with a tolerance.
 
     Raises:
-        ArgumentError: there is no solver of this name.
+        ArgumentError: there is no solver of this name, or the tolerance lies outside its range.
     """
     if name not in _SOLVERS:
         raise ArgumentError("solver", repr(name), f"must be one of {sorted(_SOLVERS)}{suggestion(name, _SOLVERS)}")
-    return _SOLVERS[name]()
+    return _SOLVERS[name]() if tolerance is None else _SOLVERS[name](tolerance=tolerance)
 
 
 def solve(
@@ -29,7 +33,7 @@ def solve(
     initial_state: ArrayLike,
     horizon: float,
     solver: str = "contour",
-    tolerance: float = 1e-8,
+    tolerance: float | None = None,
 ) -> Trajectory:
     """Solve a closed loop.
 
@@ -37,16 +41,12 @@ def solve(
         loop: plant and law, of b members or a single one.
         initial_state: [ξ(0), ξ'(0)], (n,) or (b, n), dimensionless.
         horizon: last time, dimensionless.
-        solver: name of the solver.
-        tolerance: error relative to the peaks of positions and controls.
+        solver: ``contour``, ``volterra`` or ``collocation``.
+        tolerance: error relative to the peaks of positions and controls above which a trajectory is ``failed``; None
+            for the solver's own, 1e-8 (1e-2 for ``collocation``, which is not made for more).
 
     Raises:
         ArgumentError: an argument is out of range, has a wrong shape, or names no solver.
         UnsupportedError: the solver does not take this loop.
     """
-    if solver not in _SOLVERS:
-        raise ArgumentError("solver", repr(solver), f"must be one of {sorted(_SOLVERS)}{suggestion(solver, _SOLVERS)}")
-    chosen = _SOLVERS[solver](tolerance)
-    if refusal := chosen.supports(loop):
-        raise UnsupportedError(refusal)
-    return chosen.solve(loop, initial_state, horizon)
+    return make_solver(solver, tolerance).solve(loop, initial_state, horizon)
