@@ -115,7 +115,7 @@ class PanelGrid:
         self.offsets = np.concatenate([[0], np.cumsum([panel.nodes for panel in self.panels])])
         pairs = list(zip(self.panels, self.rules, strict=True))
         self.y: Floats = np.concatenate([rule.y for rule in self.rules])
-        self.last: Floats = np.ascontiguousarray(np.concatenate([rule.last for rule in self.rules]))
+        self.last: Floats = np.ascontiguousarray(np.concatenate([rule.last for rule in self.rules]).T)
         self.weights: Floats = np.concatenate([rule.weights for rule in self.rules])
         self.times: Floats = np.concatenate([panel.time(rule.y) for panel, rule in pairs])
         self.rates: Floats = np.concatenate([panel.rate(rule.y) for panel, rule in pairs])
@@ -134,10 +134,7 @@ class PanelGrid:
 
     def slope(self, values: Floats) -> Floats:
         """Return d/dy of values (…, T) at the nodes."""
-        out = np.empty_like(values)
-        for where, _, rule in self.slices():
-            out[..., where] = values[..., where] @ rule.slope
-        return out
+        return self._mapped(values, [rule.slope for rule in self.rules])
 
     def derivative(self, values: Floats) -> Floats:
         """Return d/dt of values (…, T) at the nodes."""
@@ -145,11 +142,15 @@ class PanelGrid:
 
     def integral(self, values: Floats) -> Floats:
         """Return the integrals over time from the start of each panel to its nodes, (…, T)."""
-        out = np.zeros_like(values)
-        weighted = values * self.rates
-        for where, _, rule in self.slices():
-            out[..., where] = weighted[..., where] @ rule.integral
-        return out
+        return self._mapped(values * self.rates, [rule.integral for rule in self.rules])
+
+    def _mapped(self, values: Floats, matrices: list[Floats]) -> Floats:
+        """Apply one square matrix a panel, in products of all members at once."""
+        flat = values.reshape(-1, values.shape[-1])
+        out = np.empty_like(flat)
+        for (where, _, _), matrix in zip(self.slices(), matrices, strict=True):
+            out[:, where] = flat[:, where] @ matrix
+        return out.reshape(values.shape)
 
     def evaluate(self, values: Floats, times: Floats) -> Floats:
         """Return values (…, T) interpolated at times (t,); before the first node the first value."""

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fracctl.arrays import Array, Floats, finite
+from fracctl.arrays import Array, Booleans, Floats, finite
 from fracctl.errors import ArgumentError
 from fracctl.panels import PanelGrid
 
@@ -50,6 +50,11 @@ class Trajectory:
     def horizon(self) -> float:
         """Dimensionless end time."""
         return self.grid.horizon
+
+    @property
+    def missing(self) -> Booleans:
+        """Whether a member has no trajectory, (b,)."""
+        return np.isnan(self.positions[:, 0, -1])
 
     @cached_property
     def slopes(self) -> Floats:

@@ -23,10 +23,13 @@ compiled = numba.njit(cache=True, error_model="numpy", fastmath={"reassoc", "con
 @compiled
 def _sum(coefficients: Floats, re: Floats, im: Floats, out_re: Floats, out_im: Floats) -> None:
     """Σ_j c_j (re_j + i im_j) over the nodes of a path."""
+    count = len(coefficients)
+    a, b = coefficients[0], coefficients[1] if count > 1 else 0.0
+    second = 1 if count > 1 else 0
     for n in range(len(out_re)):
-        out_re[n] = 0.0
-        out_im[n] = 0.0
-    for j in range(len(coefficients)):
+        out_re[n] = a * re[0, n] + b * re[second, n]
+        out_im[n] = a * im[0, n] + b * im[second, n]
+    for j in range(2, count):
         c = coefficients[j]
         for n in range(len(out_re)):
             out_re[n] += c * re[j, n]

@@ -37,7 +37,7 @@ class ControlEffort:
     def __call__(self, trajectory: Trajectory) -> dict[str, Floats]:
         """Return column ``control_effort``, (b,)."""
         controls = trajectory.controls_at_nodes
-        blank = np.isnan(controls.sum(axis=(1, 2)))
+        blank = trajectory.missing
         clean = np.where(blank[:, None, None], 0.0, controls) if blank.any() else controls
         effort = self._exact(trajectory, clean) if self.resolution is None else self._sampled(trajectory, clean)
         return {self.name: np.where(blank, np.inf, effort)}

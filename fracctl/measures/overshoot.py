@@ -47,7 +47,7 @@ class Overshoot:
         samples = None if self.resolution is None else Samples(trajectory.grid, self.resolution)
         total = sum(self._component(trajectory, i, samples) for i in range(m))
         overshoot = 1.0 + self.scale * total / m
-        overshoot[np.isnan(trajectory.positions).any(axis=(1, 2))] = np.inf
+        overshoot[trajectory.missing] = np.inf
         return {self.name: overshoot}
 
     def _component(self, trajectory: Trajectory, component: int, samples: Samples | None) -> Floats:

@@ -38,7 +38,7 @@ class SettlingTime:
             last_crossing(grid, positions[:, i], slopes[:, i], self.threshold) for i in range(positions.shape[1])
         ]
         exact: Floats = np.max(components, axis=0)
-        exact[np.isnan(positions).any(axis=(1, 2))] = np.inf
+        exact[trajectory.missing] = np.inf
         if self.resolution is None:
             return {self.name: exact}
         return {self.name: self._sampled(trajectory, exact)}

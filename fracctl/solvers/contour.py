@@ -90,7 +90,8 @@ class Contour(BatchSolver):
                 tolerance = max(attempt.safety * self.tolerance, _SMALLEST_TOLERANCE)
                 try:
                     hull = group.radius * (attempt.width if members.system.size == 1 else attempt.coupled)
-                    plan = make_plan(members.horizon, hull, group.radius, group.shift, tolerance)
+                    order = 6 if members.system.size == 1 else 5
+                    plan = make_plan(members.horizon, hull, group.radius, group.shift, tolerance, order)
                 except UnsupportedError:
                     if members.every:
                         raise

@@ -19,7 +19,7 @@ def controls_and_errors(
         differences: largest difference of the two rules for each, (w, k, b, c).
         gains: υ_i = Σ_w gains[b, i, w] values[w], (b, m, w).
         offsets: first node of each panel, and T.
-        last: weights of the last three Chebyshev coefficients of each panel, (T, 3).
+        last: weights of the last three Chebyshev coefficients of each panel, (3, T).
         positions: m.
 
     Returns:
@@ -33,9 +33,9 @@ def controls_and_errors(
     for j in range(k):
         for i in range(b):
             for row in range(positions):
-                peaks[0, j, i] = max(peaks[0, j, i], np.max(np.abs(values[row, j, i])))
+                peaks[0, j, i] = max(peaks[0, j, i], _largest(values[row, j, i]))
                 tails[0, j, i] = max(tails[0, j, i], _tail(values[row, j, i], offsets, last))
-                worst[0, j, i] = max(worst[0, j, i], np.max(differences[row, j, i]))
+                worst[0, j, i] = max(worst[0, j, i], _largest(differences[row, j, i]))
             for row in range(m):
                 out = controls[j, i, row]
                 difference = 0.0
@@ -44,11 +44,27 @@ def controls_and_errors(
                     if gain != 0.0:
                         for n in range(nodes):
                             out[n] += gain * values[w, j, i, n]
-                        difference += abs(gain) * np.max(differences[w, j, i])
-                peaks[1, j, i] = max(peaks[1, j, i], np.max(np.abs(out)))
+                        difference += abs(gain) * _largest(differences[w, j, i])
+                peaks[1, j, i] = max(peaks[1, j, i], _largest(out))
                 tails[1, j, i] = max(tails[1, j, i], _tail(out, offsets, last))
                 worst[1, j, i] = max(worst[1, j, i], difference)
     return controls, peaks, tails, worst
+
+
+@compiled
+def _largest(row: Floats) -> float:
+    """Largest magnitude; NaN if there is one. Four running maxima, for one would wait for itself at every step."""
+    a, b, c, d = 0.0, 0.0, 0.0, 0.0
+    stop = len(row) - len(row) % 4
+    total = 0.0
+    for n in range(0, stop, 4):
+        p, q, r, s = abs(row[n]), abs(row[n + 1]), abs(row[n + 2]), abs(row[n + 3])
+        a, b, c, d = max(a, p), max(b, q), max(c, r), max(d, s)
+        total += (p + q) + (r + s)
+    for n in range(stop, len(row)):
+        a = max(a, abs(row[n]))
+        total += row[n]
+    return max(a, b, c, d) if total == total else np.nan
 
 
 @compiled
@@ -56,10 +72,10 @@ def _tail(row: Floats, offsets: Array, last: Floats) -> float:
     """Largest of the last three Chebyshev coefficients of any panel."""
     largest = 0.0
     for panel in range(len(offsets) - 1):
-        a, b, c = 0.0, 0.0, 0.0
-        for n in range(offsets[panel], offsets[panel + 1]):
-            a += row[n] * last[n, 0]
-            b += row[n] * last[n, 1]
-            c += row[n] * last[n, 2]
-        largest = max(largest, abs(a), abs(b), abs(c))
+        first, stop = offsets[panel], offsets[panel + 1]
+        for k in range(3):
+            total = 0.0
+            for n in range(first, stop):
+                total += row[n] * last[k, n]
+            largest = max(largest, abs(total))
     return largest

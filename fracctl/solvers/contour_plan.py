@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 
@@ -15,8 +16,6 @@ from fracctl.solvers.contour_design import ContourShape, design
 
 RATIOS = (3.0, 4.0, 5.0, 6.0, 7.0, 8.0)
 """Last over first time of a window; few values, so that few contours are designed."""
-SERIES_REACH = 0.035
-"""Time, times the pole radius, up to which the solution is taken from its power series."""
 SERIES_START = 1e-10
 """First time of the first panel, relative to the horizon: one for all plans, so that grids can be exchanged."""
 SERIES_NODES = 24
@@ -66,6 +65,8 @@ class Plan:
 
     grid: PanelGrid
     windows: tuple[Window, ...]
+    series_order: float
+    """Highest exponent of the power series that fills the first panel."""
     _kernels: dict[tuple[float, ...], list[tuple[Floats, Floats]]] = field(default_factory=dict)
     _tables: dict[tuple[float, ...], tuple[Floats, Floats]] = field(default_factory=dict)
 
@@ -110,7 +111,9 @@ def _parts(values: Complexes) -> tuple[Floats, Floats]:
 
 
 @lru_cache(maxsize=64)
-def make_plan(horizon: float, hull: float, radius: float, shift: float, tolerance: float) -> Plan:
+def make_plan(
+    horizon: float, hull: float, radius: float, shift: float, tolerance: float, series_order: int = 6
+) -> Plan:
     """Return the plan for poles with Re σ ≤ shift, |Im σ| ≤ hull, all within |σ| < radius.
 
     Args:
@@ -119,10 +122,11 @@ def make_plan(horizon: float, hull: float, radius: float, shift: float, toleranc
         radius: a circle that holds all poles; sets where the power series ends.
         shift: a, bound on the real parts of poles in the right half plane, 0 for stable loops.
         tolerance: relative error of the quadrature.
+        series_order: highest exponent of the power series near t = 0.
     """
-    reach = max(horizon * (radius + shift) / SERIES_REACH, 2.0)
-    count = int(np.ceil(np.log(reach) / np.log(RATIOS[-1])))
-    ratio = next(r for r in RATIOS if r**count >= reach)
+    span = max(horizon * (radius + shift) / _series_reach(tolerance, series_order), 2.0)
+    count = int(np.ceil(np.log(span) / np.log(RATIOS[-1])))
+    ratio = next(r for r in RATIOS if r**count >= span)
     edges = horizon * ratio ** np.arange(-count, 1.0)
     edges[-1] = horizon
     panels = [Panel(horizon * SERIES_START, float(edges[0]), SERIES_NODES, logarithmic=True)]
@@ -134,7 +138,15 @@ def make_plan(horizon: float, hull: float, radius: float, shift: float, toleranc
         first += len(group)
         shape = design(tolerance, ratio, _rounded_up(hull * group[-1].end))
         windows.append(_window(shape, where, grid.times[where], radius, shift))
-    return Plan(grid, tuple(windows))
+    return Plan(grid, tuple(windows), float(series_order))
+
+
+def _series_reach(tolerance: float, order: int) -> float:
+    """Return the time, times the pole radius R, up to which the series and its first derivative keep the tolerance.
+
+    Coefficients are of the size R^e, so that the omitted part of the derivative is (R t)^(n-1) / (n-1)! for order n.
+    """
+    return float((math.factorial(order - 1) * tolerance) ** (1.0 / (order - 1)))
 
 
 def _rounded_up(height: float) -> float:

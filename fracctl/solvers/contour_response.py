@@ -23,7 +23,6 @@ from fracctl.fractional.terms import powers
 from fracctl.solvers.contour_kernels import controls_and_errors
 from fracctl.solvers.contour_plan import Plan
 
-SERIES_ORDER = 6.0
 SAFETY = 6.0
 """Estimate over the largest difference seen: the two rules and the times compared are few."""
 Halves = tuple[Floats, Floats]
@@ -162,7 +161,7 @@ def _start(
     """Fill the first panel from the power series, and one column with its remainder; return values at 0+."""
     panel = plan.grid.panels[0]
     times = plan.grid.times[: panel.nodes]
-    series = short_time_series(system, y0, y0_rate, SERIES_ORDER)
+    series = short_time_series(system, y0, y0_rate, plan.series_order)
     initial = np.empty((*values.shape[:-1], 1))
     for i, wanted in enumerate(orders):
         values[i, :, :, : panel.nodes] = series.derivative(wanted.component, wanted.order, times)
@@ -208,12 +207,21 @@ def _source(
             else:
                 continue
             if np.any(coefficient):
-                coefficients.append(np.broadcast_to(coefficient, (k, b)))
-                exponents.append(exponent)
+                _collect(coefficients, exponents, np.broadcast_to(coefficient, (k, b)), exponent)
     if not coefficients:
         coefficients, exponents = [np.zeros((k, b))], [np.zeros(())]
     merged = np.ascontiguousarray(np.stack(coefficients, axis=-1))
     return merged, *plan.table(np.stack(np.broadcast_arrays(*exponents), axis=-1))
+
+
+def _collect(coefficients: list[Floats], exponents: list[Floats], coefficient: Floats, exponent: Floats) -> None:
+    """Add a power to a sum of powers, to the one with the same exponent if there is one."""
+    for i, known in enumerate(exponents):
+        if np.array_equal(known, exponent):
+            coefficients[i] = coefficients[i] + coefficient
+            return
+    coefficients.append(coefficient)
+    exponents.append(exponent)
 
 
 def _solve_large(
