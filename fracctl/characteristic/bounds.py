@@ -11,6 +11,10 @@ SMALLEST_RADIUS = 1e-2
 """Least bound that is returned, also for loops whose poles all lie at the origin."""
 
 
+_HALVINGS = 6
+"""Steps of bisection in the logarithm, which leave the bound 1 % above the root."""
+
+
 def pole_radius(matrix: CharacteristicMatrix) -> Floats:
     """Return R (b,) such that every zero of det M̃ off the cut has |σ| < R.
 
@@ -22,7 +26,7 @@ def pole_radius(matrix: CharacteristicMatrix) -> Floats:
     low, high = np.full(matrix.batch, SMALLEST_RADIUS), np.ones(matrix.batch)
     while np.any(grows := _norm(matrix, high) > 1.0):
         low, high = np.where(grows, high, low), np.where(grows, 2.0 * high, high)
-    for _ in range(12):
+    for _ in range(_HALVINGS):
         radius = np.sqrt(low * high)
         above = _norm(matrix, radius) > 1.0
         low, high = np.where(above, radius, low), np.where(above, high, radius)

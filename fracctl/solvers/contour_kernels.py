@@ -9,6 +9,40 @@ from fracctl.characteristic.kernels import compiled
 
 
 @compiled
+def place(
+    main: Floats,
+    other: Floats,
+    checked: Array,
+    coefficient: Floats,
+    shape: Floats,
+    values: Floats,
+    difference: Floats,
+) -> None:
+    """Write one derivative on one window, and how far the two rules differ.
+
+    Args:
+        main: (σ^e Z)(t) by the midpoint rule, (k, b, t).
+        other: the same by the trapezoidal rule at the checked times, (k, b, c).
+        checked: which of the times these are, (c,).
+        coefficient: what the initial value adds, (k, b), times
+        shape: a function of time, (1 or b, t).
+        values: out, (k, b, t).
+        difference: out, (k, b).
+    """
+    k, b, nodes = main.shape
+    for j in range(k):
+        for i in range(b):
+            worst = 0.0
+            for c in range(len(checked)):
+                gap = abs(main[j, i, checked[c]] - other[j, i, c])
+                worst = gap if not gap <= worst else worst
+            difference[j, i] = worst
+            factor, own = coefficient[j, i], min(i, len(shape) - 1)
+            for n in range(nodes):
+                values[j, i, n] = main[j, i, n] + factor * shape[own, n]
+
+
+@compiled
 def controls_and_errors(
     values: Floats, differences: Floats, gains: Floats, offsets: Array, last: Floats, positions: int
 ) -> tuple[Floats, Floats, Floats, Floats]:

@@ -20,7 +20,7 @@ from fracctl.characteristic.winding import crossings
 from fracctl.fractional.series import short_time_series
 from fracctl.fractional.system import LinearFractionalSystem
 from fracctl.fractional.terms import powers
-from fracctl.solvers.contour_kernels import controls_and_errors
+from fracctl.solvers.contour_kernels import controls_and_errors, place
 from fracctl.solvers.contour_plan import Plan
 
 SAFETY = 6.0
@@ -109,11 +109,8 @@ def _derivatives(
     for component in range(p):
         wanted = [i for i, order in enumerate(orders) if order.component == component]
         for places, exponents, halves in _requests(system, plan, transforms[component], wanted, orders):
-            _invert(plan, exponents, halves, places, values, differences)
-    for i, order in enumerate(orders):
-        added = _initial_value(order, y0, y0_rate, plan.grid.times[plan.windows[0].where.start :])
-        if added is not None:
-            values[i, :, :, plan.windows[0].where.start :] += added
+            added = [_initial_value(orders[i], y0, y0_rate) for i in places]
+            _invert(plan, exponents, halves, places, added, values, differences)
     return values, differences, initial, enclosed
 
 
@@ -130,7 +127,13 @@ def _requests(
 
 
 def _invert(
-    plan: Plan, exponents: tuple[float, ...], halves: Halves, places: list[int], values: Floats, differences: Floats
+    plan: Plan,
+    exponents: tuple[float, ...],
+    halves: Halves,
+    places: list[int],
+    added: list[tuple[Floats, Floats]],
+    values: Floats,
+    differences: Floats,
 ) -> None:
     """Fill in (σ^e Z)(t) on all windows and the largest difference from the other rule at the checked times."""
     odd, even = halves
@@ -138,15 +141,16 @@ def _invert(
     at = 0
     for number, (window, (middle, ends)) in enumerate(zip(plan.windows, plan.kernels(exponents), strict=True)):
         n = window.nodes
-        main = odd.reshape(k * b, -1)[:, at : at + 2 * n] @ middle
+        main = (odd.reshape(k * b, -1)[:, at : at + 2 * n] @ middle).reshape(k, b, count, -1)
         start = at + 2 * number
-        other = even.reshape(k * b, -1)[:, start : start + 2 * n + 2] @ ends
+        other = (even.reshape(k * b, -1)[:, start : start + 2 * n + 2] @ ends).reshape(k, b, count, -1)
         at += 2 * n
-        main, other = main.reshape(k, b, count, -1), other.reshape(k, b, count, -1)
-        difference = np.abs(main[..., window.checked] - other).max(axis=-1)
-        for j, place in enumerate(places):
-            values[place, :, :, window.where] = main[:, :, j]
-            differences[place, :, :, number + 1] = difference[:, :, j]
+        for j, (i, (coefficient, power)) in enumerate(zip(places, added, strict=True)):
+            shape = window.times ** power[:, None] * rgamma(power[:, None] + 1.0)
+            out = values[i, :, :, window.where]
+            place(
+                main[:, :, j], other[:, :, j], window.checked, coefficient, shape, out, differences[i, :, :, number + 1]
+            )
 
 
 def _start(
@@ -277,17 +281,14 @@ def _times_powers(plan: Plan, halves: Halves, order: Floats) -> Halves:
     return odd, even
 
 
-def _initial_value(wanted: _Derivative, y0: Floats, y0_rate: Floats, times: Floats) -> Floats | None:
-    """Return D^γ of y(0) for γ ≤ 0; minus the power that σ^γ Z has too much of for 1 < γ; None where zero."""
+def _initial_value(wanted: _Derivative, y0: Floats, y0_rate: Floats) -> tuple[Floats, Floats]:
+    """Return what D^γ y has besides σ^γ Z, as c t^p / Γ(p + 1): c (k, b) and p (1,) or (b,).
+
+    D^γ of y(0) for γ ≤ 0; minus the power that σ^γ Z has too much of for 1 < γ; nothing between.
+    """
     order, column = wanted.order, wanted.component
     if np.all(order <= 0.0):
-        coefficient, power = y0[..., column], -order
-    elif np.all(order > 1.0):
-        coefficient, power = -y0_rate[..., column], 1.0 - order
-    else:
-        return None
-    if not np.any(coefficient):
-        return None
-    exponent = np.asarray(power)[..., None]
-    values: Floats = coefficient[..., None] * times**exponent * rgamma(exponent + 1.0)
-    return values
+        return y0[..., column], np.atleast_1d(-order)
+    if np.all(order > 1.0):
+        return -y0_rate[..., column], np.atleast_1d(1.0 - order)
+    return np.zeros(y0.shape[:-1]), np.zeros(1)
