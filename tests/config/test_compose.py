@@ -38,7 +38,7 @@ def test_an_experiment_overrides_groups_and_the_command_line_overrides_it() -> N
     assert config.name == "ic2_outofplane"
     assert list(config.initial_condition) == ["ic3"]
     assert config.scheduler.type == "serial"
-    assert config.solver.model_dump() == {"type": "contour", "tolerance": 1e-6, "cross_check": 0.0}
+    assert config.solver.model_dump() == {"type": "contour", "tolerance": 1e-6, "cross_check": 0.01}
 
 
 def test_the_order_of_words_does_not_matter_between_keys_and_groups() -> None:
