@@ -15,7 +15,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from scipy.special import rgamma, roots_jacobi
+from scipy.linalg import eigh_tridiagonal
+from scipy.special import rgamma
 
 from fracctl.arrays import Floats
 
@@ -41,8 +42,8 @@ class ChebyshevNodes:
         rows = hit.any(axis=1)
         gap[hit] = 1.0
         matrix = self.weights / gap
-        matrix /= matrix.sum(axis=1, keepdims=True)
         matrix[rows] = hit[rows]
+        matrix /= matrix.sum(axis=1, keepdims=True)
         return matrix
 
 
@@ -139,9 +140,18 @@ def _memory_basis(n: int, distance: int) -> tuple[Floats, Floats, Floats]:
 
 @lru_cache(maxsize=_CACHED)
 def _jacobi(count: int, order: float) -> tuple[Floats, Floats]:
-    """Return nodes and weights on [0, 1] for the weight (1-τ)^(order-1)."""
-    x, w = roots_jacobi(count, order - 1.0, 0.0)
-    return 0.5 * (1.0 + x), w * 0.5**order
+    """Return nodes and weights on [0, 1] for the weight (1-τ)^(order-1).
+
+    Golub and Welsch's eigenvalues: exact to a few units of rounding also for small orders, where a root finder loses
+    the distance of the last nodes from 1.
+    """
+    k = np.arange(1.0, count)
+    twice = 2.0 * k + order - 1.0
+    diagonal = np.concatenate([[(1.0 - order) / (1.0 + order)], -((order - 1.0) ** 2) / (twice * (twice + 2.0))])
+    squares = (2.0 * k * (k + order - 1.0) / twice) ** 2 / ((twice + 1.0) * np.where(k == 1.0, 1.0, twice - 1.0))
+    squares[:1] = 4.0 * order / ((1.0 + order) ** 2 * (2.0 + order))
+    x, vectors = eigh_tridiagonal(diagonal, np.sqrt(squares))
+    return np.asarray(0.5 * (1.0 + x), dtype=np.float64), np.asarray(vectors[0] ** 2 / order, dtype=np.float64)
 
 
 def power_derivative(exponent: float, order: float, times: Floats) -> Floats:

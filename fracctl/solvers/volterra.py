@@ -153,7 +153,7 @@ def _rounding(series: PowerSeries, panels: UniformPanels, response: Values) -> F
     On the last panel y is (S - h) P'(h) + P(h) plus what cancels most of it.
     """
     m = response.positions.shape[2]
-    h, exponents = panels.length, np.array([float(e) for e in series.exponents])
+    h, exponents = panels.length, np.asarray(series.exponents, dtype=np.float64)
     sizes = h**exponents * rgamma(exponents + 1.0) * (1.0 + exponents * (panels.count - 1))
     total = np.tensordot(sizes, np.abs(series.coefficients[:, :m]), axes=(0, 0)).max(axis=0)
     peak = np.abs(response.positions).max(axis=(2, 3))

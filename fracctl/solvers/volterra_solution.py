@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.special import betainc, rgamma
 
-from fracctl.arrays import Booleans, Floats
+from fracctl.arrays import Floats
 from fracctl.characteristic.matrix import CharacteristicMatrix
 from fracctl.fractional.series import PowerSeries
 from fracctl.fractional.system import LinearFractionalSystem
@@ -32,7 +32,7 @@ class Solution:
         self.system, self.series, self.panels = system, series, panels
         matrix = CharacteristicMatrix(system)
         self.terms = list(terms_of(matrix))
-        self.exponents = np.array([float(e) for e in series.exponents])
+        self.exponents = np.asarray(series.exponents, dtype=np.float64)
         self.highest = np.zeros((*series.coefficients.shape[2:], system.size, panels.count, panels.nodes))
         """g, (k, b, p, count, N)."""
         for block in matrix.blocks():
@@ -43,7 +43,7 @@ class Solution:
         order = next((t.order for t in self.terms if abs(t.order - order) < _SAME), order)
         panels, g = self.panels, self.highest[:, :, component]
         integral = self._integral(component, order)
-        first = self.series.derivative(component, order, panels.start) + panels.on_start(integral, g[:, :, 0])
+        first = self._powers(component, order, panels.start) + panels.on_start(integral, g[:, :, 0])
         if panels.count == 1:
             return first
         later = self._later_powers(component, order)
@@ -74,7 +74,7 @@ class Solution:
     def _known(self, component: int, order: float, panel: int, powers: Floats) -> Floats:
         """Return D^order of a coordinate at the nodes of a panel without the part of g on that panel, (k, b, N)."""
         if panel == 0:
-            return self.series.derivative(component, order, self.panels.first_times)
+            return self._powers(component, order, self.panels.first_times)
         before = self.highest[:, :, component, :panel]
         added: Floats = powers[:, :, panel - 1] + self.panels.memory(self._integral(component, order), before)
         return added
@@ -89,31 +89,28 @@ class Solution:
         return solve_each(matrix, np.broadcast_to(np.eye(matrix.shape[-1]), matrix.shape))
 
     def _later_powers(self, component: int, order: float) -> Floats:
-        """Return what P on the first panel adds to D^order of a coordinate at the nodes of the others, (k, b, q, N).
+        """Return what P on the first panel adds to D^order of a coordinate at the nodes of the others, (k, b, q, N)."""
+        times = self.panels.later_times
+        powers = self._powers(component, order, times.ravel(), later=True)
+        return powers.reshape(*powers.shape[:2], *times.shape)
+
+    def _powers(self, component: int, order: float, times: Floats, later: bool = False) -> Floats:
+        """Return what P on the first panel adds to D^order of a coordinate at times on it or `later`, (k, b, t).
 
         1/Γ(μ) ∫₀ʰ (t-τ)^(μ-1) τ^(a-1)/Γ(a) dτ = t^(a+μ-1)/Γ(a+μ) B(h/t; a, μ) with the regularised incomplete beta
         function B; y(0) + y'(0) t counts in full.
         """
-        times = self.panels.later_times
         coefficients = self.series.coefficients[:, component]
-        integral = self._integral(component, order)
-        used = np.flatnonzero(np.any(coefficients, axis=(1, 2)) & ~self._killed(order))
+        killed = (self.exponents < order) & (self.exponents == np.floor(self.exponents))
+        used = np.flatnonzero(np.any(coefficients, axis=(1, 2)) & ~killed)
         _, first, which = np.unique(self.exponents[used].round(9), return_index=True, return_inverse=True)
-        distinct = self.exponents[used][first]
-        merged = np.zeros((len(distinct), *coefficients.shape[1:]))
+        exponents = self.exponents[used][first]
+        merged = np.zeros((len(exponents), *coefficients.shape[1:]))
         np.add.at(merged, which, coefficients[used])
-        basis = times.ravel() ** (distinct[:, None] - order) * rgamma(distinct[:, None] - order + 1.0)
-        start = float(self.system.highest[component]) - 1.0
-        inner = distinct > start
-        if integral == 0.0:
-            basis[inner] = 0.0
-        else:
-            share = self.panels.length / times.ravel()
-            basis[inner] *= betainc(distinct[inner, None] - start, integral, share)
-        total: Floats = np.tensordot(merged, basis, axes=(0, 0))
-        return total.reshape(*total.shape[:2], *times.shape)
-
-    def _killed(self, order: float) -> Booleans:
-        """Whether the Caputo derivative takes each power of P to zero."""
-        killed: Booleans = (self.exponents < order) & (self.exponents == np.floor(self.exponents))
-        return killed
+        basis = times ** (exponents[:, None] - order) * rgamma(exponents[:, None] - order + 1.0)
+        if later:
+            start, integral = float(self.system.highest[component]) - 1.0, self._integral(component, order)
+            inner = exponents > start
+            share = self.panels.length / times
+            basis[inner] *= betainc(exponents[inner, None] - start, integral, share) if integral else 0.0
+        return np.tensordot(merged, basis, axes=(0, 0))
