@@ -109,7 +109,7 @@ def _row(plane: str, words: tuple[str, str, str], error: float, timings: dict[st
         "setting": words[2],
         "error": error,
         "ms": 1e3 * timing.seconds,
-        "quartiles": timing.spread,
+        "spread": timing.spread,
         "over the engine": ratio(timing, timings[ENGINE]),
         "load": machine.load(),
     }

@@ -24,6 +24,12 @@ _PEERS: dict[tuple[str, str], dict[str, Any]] = {
     ("nilt-python", "fixed Talbot"): {"color": CYCLE[5], "marker": "P"},
     ("pymittagleffler", "closed solution"): {"color": GREY, "marker": "X"},
 }
+_BESIDE: dict[str, Any] = {
+    "textcoords": "offset points",
+    "va": "center",
+    "fontsize": 7.0,
+    "bbox": {"facecolor": "white", "edgecolor": "none", "pad": 0.8},
+}
 
 
 def write(folder: Path, figures: dict[str, Figure]) -> list[Path]:
@@ -52,10 +58,11 @@ def throughput(table: pd.DataFrame) -> Figure:
             ax.set_title(plane.capitalize(), loc="left", fontweight="bold")
             ax.tick_params(axis="y", length=0.0)
             for y, rate in enumerate(rows["evaluations a second"]):
-                ax.text(1.03 * rate, y, f"{rate / 1e3:.0f} k", va="center", fontsize=7.0)
-        axes[0].set_xscale("log")
+                ax.annotate(f"{rate / 1e3:.0f} k", (rate, y), (3, 0), **_BESIDE)
         above = {"transform": axes[0].get_xaxis_transform(), "ha": "center", "va": "bottom"}
         axes[0].text(ASKED["out-of-plane"], 1.02, "asked", color=ORANGE, fontsize=8.0, **above)
+        axes[1].set_xlim(0.0, 1.1 * table["evaluations a second"].max())
+        axes[1].xaxis.set_major_formatter(lambda rate, _: f"{rate / 1e3:.0f} k")
         axes[1].set_xlabel("Evaluations a second on one core")
         return figure
 
