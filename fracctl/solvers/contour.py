@@ -99,8 +99,8 @@ class Contour(BatchSolver):
                     continue
                 cost[group.rows] += plan.nodes
                 part = members.take(group.rows)
-                response = respond(part.system, part.y0, part.rate, plan, part.every)
-                good = response.enclosed & (response.error.max(axis=0) <= self.tolerance)
+                response, enclosed = respond(part.system, part.y0, part.rate, plan, part.every)
+                good = enclosed & (response.error.max(axis=0) <= self.tolerance)
                 done = good if attempt is not _ATTEMPTS[-1] else np.ones_like(good)
                 missed.append(group.rows[~done])
                 if done.any():

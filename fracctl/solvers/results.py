@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Protocol
 
 import numpy as np
 
@@ -11,46 +10,11 @@ from fracctl.arrays import Array, Booleans, Floats
 from fracctl.panels import Panel, PanelGrid
 from fracctl.solvers.base import Survey
 from fracctl.solvers.members import Members
+from fracctl.solvers.outputs import Values
 from fracctl.trajectory import Trajectory
 
 
-class Response(Protocol):
-    """Values of a group of members on a grid, from k initial states each."""
-
-    @property
-    def positions(self) -> Floats:
-        """ξ, (k, b, m, T)."""
-        ...
-
-    @property
-    def rates(self) -> Floats | None:
-        """ξ', (k, b, m, T), or None."""
-        ...
-
-    @property
-    def auxiliary(self) -> Floats:
-        """z, (k, b, q, T)."""
-        ...
-
-    @property
-    def controls(self) -> Floats:
-        """υ, (k, b, m, T)."""
-        ...
-
-    @property
-    def initial_controls(self) -> Floats:
-        """υ(0+), (k, b, m)."""
-        ...
-
-    @property
-    def error(self) -> Floats:
-        """Estimated error of positions and controls over their peaks, (k, b)."""
-        ...
-
-
-def packed(
-    members: Members, response: Response, chosen: Array, good: Booleans, nodes: Array, grid: PanelGrid
-) -> Survey:
+def packed(members: Members, response: Values, chosen: Array, good: Booleans, nodes: Array, grid: PanelGrid) -> Survey:
     """Return the `chosen` of the members with their status, k·r trajectories."""
     k, count = response.positions.shape[:2]
     everyone = len(chosen) == count
