@@ -8,7 +8,7 @@ decreases as N^(-2(e-1)) only. `Contour` and `Volterra` have no such limit.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -30,6 +30,7 @@ _FEWEST_NODES = 4
 _MOST_NODES = 1024
 _ACCURACY = 1e-10
 """Of the grid on which the polynomial is handed out."""
+_ROUNDING = 4.0 * np.finfo(float).eps
 _LARGEST_CHUNK = 4_000_000
 """Entries of the matrices that are solved at once."""
 
@@ -38,7 +39,8 @@ class Collocation(BatchSolver):
     """Chebyshev-Gauss-Lobatto collocation with stable fractional differentiation matrices.
 
     Solves linear loops with terms of orders in [-1, 2) (below 1 of auxiliary states). The error of a polynomial of
-    degree N is estimated by twice its difference from that of degree N/2, whose error is larger.
+    degree N is estimated by twice its difference from that of degree N/2, whose error is larger; rounding at the end of
+    a growing solution, the largest value there is, counts as an error of its initial values.
 
     Args:
         nodes: N, degree of the polynomial: the points of collocation besides the one at 0, from 4 to 1024.
@@ -64,7 +66,7 @@ class Collocation(BatchSolver):
         self.form, self.tolerance, self.cross_check = form, float(tolerance), share("cross_check", cross_check)
 
     def _solved(self, members: Members, rows: Array, radius: Floats, shift: Floats) -> Iterator[Survey]:
-        del radius, shift
+        del radius
         k, unknowns = len(members.y0), 2 * members.system.size * (self.nodes + 1)
         chunk = max(_LARGEST_CHUNK // (unknowns * (unknowns + 8 * k)), 1)
         for start in range(0, len(rows), chunk):
@@ -72,6 +74,8 @@ class Collocation(BatchSolver):
             grid = _grid(part.horizon, self.nodes)
             with np.errstate(over="ignore", invalid="ignore"):
                 response = self._values(part, grid)
+            growth = np.exp(shift[rows[start : start + chunk]] * part.horizon)
+            response = replace(response, error=np.maximum(response.error, _ROUNDING * growth))
             good = response.error.max(axis=0) <= self.tolerance
             cost = np.full(len(good), self.nodes + self.nodes // 2)
             yield packed(part, response, np.arange(len(good)), good, cost, grid)
