@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -122,6 +122,10 @@ class PanelGrid:
         for i, panel in enumerate(self.panels):
             self.times[self.offsets[i]], self.times[self.offsets[i + 1] - 1] = panel.start, panel.end
 
+    @cached_property
+    def _integrals(self) -> list[Floats]:
+        return [self.rates[where, None] * rule.integral for where, _, rule in self.slices()]
+
     @property
     def horizon(self) -> float:
         """The end of the last panel."""
@@ -142,14 +146,14 @@ class PanelGrid:
 
     def integral(self, values: Floats) -> Floats:
         """Return the integrals over time from the start of each panel to its nodes, (…, T)."""
-        return self._mapped(values * self.rates, [rule.integral for rule in self.rules])
+        return self._mapped(values, self._integrals)
 
     def _mapped(self, values: Floats, matrices: list[Floats]) -> Floats:
         """Apply one square matrix a panel, in products of all members at once."""
         flat = values.reshape(-1, values.shape[-1])
         out = np.empty_like(flat)
         for (where, _, _), matrix in zip(self.slices(), matrices, strict=True):
-            out[:, where] = flat[:, where] @ matrix
+            np.matmul(flat[:, where], matrix, out=out[:, where])
         return out.reshape(values.shape)
 
     def evaluate(self, values: Floats, times: Floats) -> Floats:

@@ -76,15 +76,15 @@ def node_root(
     u, tangent = _cubic_root(f0, f1, slope[j] * width, slope[j + 1] * width)
     before, f_before = u, 0.0
     for attempt in range(8):
-        point: float = y[j] + u * width
-        f = at(y, weights, row, first, stop, point) - level
-        if f == 0.0 or (attempt > 0 and abs(u - before) < near):
-            return point
-        if attempt > 0:
+        f = at(y, weights, row, first, stop, y[j] + u * width) - level
+        if attempt > 0 and f != f_before:
             tangent = (f - f_before) / (u - before)
         if tangent == 0.0 or not 0.0 <= u - f / tangent <= 1.0:
             break
         before, f_before, u = u, f, u - f / tangent
+        if abs(u - before) < near:
+            point: float = y[j] + u * width
+            return point
     return bracketed_root(y, weights, row, first, stop, y[j], y[j + 1], f0, f1, level)
 
 

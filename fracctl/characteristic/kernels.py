@@ -17,7 +17,7 @@ from fracctl.arrays import Array, Booleans, Floats
 LARGEST_CHANGE = 0.5
 """Change of a function over a step, relative to its size at both ends, beyond which the step is doubtful."""
 
-compiled = numba.njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
+compiled = numba.njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz", "arcp"})
 
 
 @compiled
@@ -49,13 +49,24 @@ def _turns(re: Floats, im: Floats) -> tuple[int, bool]:
 
 
 @compiled
-def _enclosed(re: Floats, im: Floats, layout: Array) -> bool:
+def _enclosed(re: Floats, im: Floats, layout: Array, order: Array) -> bool:
     """Whether the phase does not turn along any of the paths, and each begins with a positive value."""
     for w in range(len(layout)):
         first = layout[w, 0]
         stop = layout[w + 1, 0] if w + 1 < len(layout) else len(re)
-        turns, ambiguous = _turns(re[first:stop], im[first:stop])
-        if turns != 0 or ambiguous or re[first] <= 0.0:
+        here = order[first]
+        if re[here] <= 0.0:
+            return False
+        turns = 0
+        for n in range(first + 1, stop):
+            there = order[n]
+            if re[here] * re[there] + im[here] * im[there] <= 0.0:
+                return False
+            if (im[here] < 0.0) != (im[there] < 0.0):
+                left = (re[here] * im[there] - re[there] * im[here]) * (im[there] - im[here]) < 0.0
+                turns += (1 if im[there] < 0.0 else -1) if left else 0
+            here = there
+        if turns != 0:
             return False
     return True
 
@@ -66,13 +77,13 @@ def _split(re: Floats, im: Floats, layout: Array, odd: Floats, even: Floats) -> 
     at = 0
     for w in range(len(layout)):
         first, nodes = layout[w, 0], layout[w, 1]
-        for n in range(nodes):
-            odd[at + n] = re[first + 2 * n + 1]
-            odd[at + nodes + n] = im[first + 2 * n + 1]
         start = at + 2 * w
+        for n in range(nodes):
+            odd[at + n] = re[first + n]
+            odd[at + nodes + n] = im[first + n]
         for n in range(nodes + 1):
-            even[start + n] = re[first + 2 * n]
-            even[start + nodes + 1 + n] = im[first + 2 * n]
+            even[start + n] = re[first + nodes + n]
+            even[start + nodes + 1 + n] = im[first + nodes + n]
         at += 2 * nodes
 
 
@@ -86,13 +97,14 @@ def _invert(re: Floats, im: Floats) -> None:
 
 
 @compiled
-def solve_scalar(entry: Any, source: Any, layout: Array, odd: Floats, even: Floats) -> Booleans:
+def solve_scalar(entry: Any, source: Any, layout: Array, order: Array, odd: Floats, even: Floats) -> Booleans:
     """Solve M̃ Z̃ = r for one coordinate at the interlaced nodes of several paths.
 
     Args:
         entry: coefficients (b, J), real and imaginary powers (1 or b, J, P).
         source: the same for r, coefficients (k, b, Q).
-        layout: first node and N of each path, (W, 2); a path begins with N + 1 even and N odd nodes in turn.
+        layout: first node and N of each path, (W, 2); a path begins with its N odd and its N + 1 even nodes.
+        order: places of the nodes in the order along the paths, (P,).
         odd: out, (1, k, b, Σ 2N), real parts then imaginary parts of each path.
         even: out, (1, k, b, Σ (2N + 2)).
 
@@ -107,7 +119,7 @@ def solve_scalar(entry: Any, source: Any, layout: Array, odd: Floats, even: Floa
     for i in range(count):
         shared, own = min(i, re.shape[0] - 1), min(i, s_re.shape[0] - 1)
         _sum(c[i], re[shared], im[shared], d_re, d_im)
-        enclosed[i] = _enclosed(d_re, d_im, layout)
+        enclosed[i] = _enclosed(d_re, d_im, layout, order)
         _invert(d_re, d_im)
         for k in range(len(s)):
             _sum(s[k, i], s_re[own], s_im[own], r_re, r_im)
@@ -133,7 +145,7 @@ def _determinant(entries: Any, i: int, m_re: Floats, m_im: Floats, d_re: Floats,
 
 
 @compiled
-def solve_pair(entries: Any, sources: Any, layout: Array, odd: Floats, even: Floats) -> Booleans:
+def solve_pair(entries: Any, sources: Any, layout: Array, order: Array, odd: Floats, even: Floats) -> Booleans:
     """Solve M̃ Z̃ = r for two coordinates; `entries` holds M̃₁₁, M̃₁₂, M̃₂₁, M̃₂₂ and `sources` r₁, r₂, as above."""
     count, length = len(entries[0][0]), entries[0][1].shape[2]
     enclosed = np.empty(count, np.bool_)
@@ -143,7 +155,7 @@ def solve_pair(entries: Any, sources: Any, layout: Array, odd: Floats, even: Flo
     z_re, z_im = np.empty(length), np.empty(length)
     for i in range(count):
         _determinant(entries, i, m_re, m_im, d_re, d_im)
-        enclosed[i] = _enclosed(d_re, d_im, layout)
+        enclosed[i] = _enclosed(d_re, d_im, layout, order)
         _invert(d_re, d_im)
         for k in range(len(sources[0][0])):
             for row in range(2):
@@ -163,13 +175,13 @@ def solve_pair(entries: Any, sources: Any, layout: Array, odd: Floats, even: Flo
     return enclosed
 
 
-def solve(entries: Any, sources: Any, layout: Array, odd: Floats, even: Floats) -> Booleans:
+def solve(entries: Any, sources: Any, layout: Array, order: Array, odd: Floats, even: Floats) -> Booleans:
     """Solve one or two coordinates; see `solve_scalar` and `solve_pair`."""
     enclosed: Booleans
     if len(sources) == 1:
-        enclosed = solve_scalar(entries[0], sources[0], layout, odd, even)
+        enclosed = solve_scalar(entries[0], sources[0], layout, order, odd, even)
     else:
-        enclosed = solve_pair(entries, sources, layout, odd, even)
+        enclosed = solve_pair(entries, sources, layout, order, odd, even)
     return enclosed
 
 

@@ -24,17 +24,18 @@ _SMALLEST_STEP = 1e-13
 """Relative length at which an interval of the path is given up: the phase turns on the line itself."""
 
 
-def unstable_zeros(matrix: CharacteristicMatrix) -> tuple[Floats, Booleans]:
+def unstable_zeros(matrix: CharacteristicMatrix, radius: Floats | None = None) -> tuple[Floats, Booleans]:
     """Count the zeros of det M̃ with Re σ > 0.
 
     Args:
         matrix: the characteristic matrix of a batch of b loops.
+        radius: its `pole_radius`, if that is known already.
 
     Returns:
         The counts (b,), NaN where a zero lies on the imaginary axis to rounding, and whether (b,) the loop is
         marginal in that sense.
     """
-    outer = 2.0 * float(np.max(pole_radius(matrix)))
+    outer = 2.0 * float(np.max(pole_radius(matrix) if radius is None else radius))
     n_line = 2 + int(np.log(outer / _INNER) / np.log(_RATIO))
     line = 1j * np.geomspace(outer, _INNER, n_line)
     arc = _INNER * np.exp(1j * np.linspace(np.pi / 2, 0.0, 8))[1:]

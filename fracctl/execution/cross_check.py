@@ -67,9 +67,8 @@ class CrossCheck:
         """Return a sentence on what came out."""
         if self._second is None:
             return []
-        return [
-            f"cross-check: {self.rows} rows solved by {self._second.name} too, worst difference {self.worst:.1e} of the peak"
-        ]
+        worst = f"worst difference {self.worst:.1e} of the peak"
+        return [f"cross-check: {self.rows} rows solved by {self._second.name} too, {worst}"]
 
     def summary(self) -> dict[str, Any]:
         """Return what the summary of the run says of it; a disagreement fails the run."""

@@ -83,7 +83,8 @@ class BatchSolver(ABC):
         for which in equal_orders(everyone.system, self.fewest_shared):
             members = everyone.take(which)
             matrix = CharacteristicMatrix(members.system)
-            zeros, marginal = unstable_zeros(matrix)
+            radius = pole_radius(matrix)
+            zeros, marginal = unstable_zeros(matrix, radius)
             stable = (zeros == 0.0).astype(object)
             stable[marginal] = None
             members = replace(members, stable=stable)
@@ -95,7 +96,7 @@ class BatchSolver(ABC):
             if given_up.any():
                 word = "diverged" if members.every else "unstable"
                 yield without_trajectory(members.take(np.flatnonzero(given_up)), word)
-            yield from self._solved(members, np.flatnonzero(~given_up), pole_radius(matrix), shift)
+            yield from self._solved(members, np.flatnonzero(~given_up), radius, shift)
 
     def _refusal(self, system: LinearFractionalSystem) -> str | None:
         """Return why a linear loop is refused, or None."""

@@ -77,8 +77,21 @@ class Plan:
 
     @cached_property
     def path(self) -> Complexes:
-        """The paths of all windows, one after the other."""
-        return np.concatenate([window.path for window in self.windows])
+        """The paths of all windows, one after the other: of each the odd nodes, the even ones, and the rest."""
+        parts = [
+            (w.path[1 : 2 * w.nodes : 2], w.path[: 2 * w.nodes + 1 : 2], w.path[2 * w.nodes + 1 :])
+            for w in self.windows
+        ]
+        return np.concatenate([part for window in parts for part in window])
+
+    @cached_property
+    def order(self) -> Array:
+        """Places in `path` in the order along each contour, (P,)."""
+        order = np.arange(len(self.path))
+        for first, n in self.layout:
+            order[first : first + 2 * n + 1 : 2] = first + n + np.arange(n + 1)
+            order[first + 1 : first + 2 * n : 2] = first + np.arange(n)
+        return order
 
     @cached_property
     def layout(self) -> Array:

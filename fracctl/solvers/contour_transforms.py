@@ -29,7 +29,7 @@ def transforms(matrix: CharacteristicMatrix, y0: Floats, y0_rate: Floats, plan: 
         sources = tuple(_source(matrix.system, i, y0, y0_rate, plan) for i in block)
         odd, even = np.empty((len(block), k, b, 2 * n)), np.empty((len(block), k, b, 2 * n + 2 * w))
         if len(block) <= 2:
-            enclosed &= kernels.solve(matrix.tables(block, plan.table), sources, plan.layout, odd, even)
+            enclosed &= kernels.solve(matrix.tables(block, plan.table), sources, plan.layout, plan.order, odd, even)
         else:
             enclosed &= _solve_large(matrix, block, sources, plan, odd, even)
         solved |= {i: (odd[j], even[j]) for j, i in enumerate(block)}
@@ -84,7 +84,7 @@ def _solve_large(
     matrices = stack(entries, shape)
     right = np.stack([c @ re + 1j * (c @ im) for c, re, im in (_aligned(source) for source in sources)], axis=-1)
     solution = np.linalg.solve(matrices, right[..., None])[..., 0]
-    det = np.linalg.det(matrices)
+    det = np.linalg.det(matrices)[:, plan.order]
     enclosed = np.ones(matrix.batch, dtype=bool)
     at = 0
     for number, (first, n) in enumerate(plan.layout):
@@ -93,8 +93,8 @@ def _solve_large(
         enclosed &= (turns == 0.0) & ~steps.any(axis=1) & (det[:, first].real > 0.0)
         part = np.moveaxis(np.asarray(solution[..., first : first + 2 * n + 1, :], dtype=np.complex128), -1, 0)
         start = at + 2 * number
-        odd[..., at : at + 2 * n] = _halves(part[..., 1::2])
-        even[..., start : start + 2 * n + 2] = _halves(part[..., 0::2])
+        odd[..., at : at + 2 * n] = _halves(part[..., :n])
+        even[..., start : start + 2 * n + 2] = _halves(part[..., n:])
         at += 2 * n
     return enclosed
 
