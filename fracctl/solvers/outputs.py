@@ -71,7 +71,7 @@ def _controls(system: LinearFractionalSystem, derivative: Derivative) -> Floats:
 
 
 def _difference(fine: Floats, coarse: Floats) -> Floats:
-    """Return the largest difference over the peak, (k, b): 0 where both vanish."""
+    """Return the largest difference over the peak, (k, b): 0 where both vanish, +inf where one is no number."""
     difference, peak = np.abs(fine - coarse).max(axis=(-2, -1)), np.abs(fine).max(axis=(-2, -1))
     relative: Floats = np.divide(difference, peak, out=np.where(difference == 0.0, 0.0, np.inf), where=peak > 0.0)
-    return relative
+    return np.where(np.isnan(relative), np.inf, relative)

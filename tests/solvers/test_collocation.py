@@ -11,7 +11,7 @@ from fracctl.loop import ClosedLoop
 from fracctl.plants import HCWInPlane, HCWOutOfPlane
 from fracctl.solvers import Collocation, solve
 from fracctl.solvers.blocks import solve_each
-from tests.references import loops, poles
+from tests.references import loops, poles, series
 from tests.references.laplace import QuickReference, Reference
 from tests.references.loops import Loop
 from tests.references.product import check_times, closed_loop
@@ -78,6 +78,19 @@ def test_orders_above_one(form: str) -> None:
     exact = solve(loop, start, 10.0, solver="contour", tolerance=1e-10)
     trajectory = Collocation(128, form).solve(loop, start, 10.0)
     assert np.abs(trajectory(times) - exact(times))[:, 0].max() < 2e-3 * np.abs(exact(times)[:, 0]).max()
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("horizon", [3.0, 4.0])
+def test_the_estimate_knows_of_growing_solutions(form: str, horizon: float) -> None:
+    """Rounding at the end, of the size of the peak, is an error of the initial values that grows with them."""
+    members = [m.replace(alpha=[1.0, 1.0]) for m in loops.random_in_plane(91, 8)]
+    times = np.linspace(0.1, horizon, 30)
+    trajectory = Collocation(128, form).solve(closed_loop(members), np.array([m.start for m in members]), horizon)
+    for i, member in enumerate(members):
+        exact = series.matrix_exponential(member, times)[0][:, :2]
+        error = np.abs(trajectory(times)[i, :, :2] - exact).max() / np.abs(exact).max()
+        assert error <= trajectory.error_estimate[i] < 0.1
 
 
 def test_the_two_forms_are_two_methods() -> None:
