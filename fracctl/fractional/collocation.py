@@ -129,13 +129,19 @@ def _memory_basis(n: int, distance: int) -> tuple[Floats, Floats, Floats]:
     if distance == 1:
         nearest[0] = nearest[1]
     pieces = int(np.ceil(np.log2(1.0 + 1.0 / nearest.min())))
-    x, w = np.polynomial.legendre.leggauss(n // 2 + _BEYOND_DEGREE)
+    x, w = _legendre(n // 2 + _BEYOND_DEGREE)
     edges = nearest[:, None] * (1.0 + 1.0 / nearest[:, None]) ** (np.arange(pieces + 1) / pieces)
     half = 0.5 * np.diff(edges)
     reach = (edges[:, :-1, None] + half[..., None] * (x + 1.0)).reshape(n, -1)
     weights = (half[..., None] * w).reshape(n, -1)
     points = np.clip(nearest[:, None] + 1.0 - reach, 0.0, 1.0)
     return reach, weights, nodes.interpolation(points.ravel()).reshape(n, -1, n)
+
+
+@lru_cache(maxsize=_CACHED)
+def _legendre(count: int) -> tuple[Floats, Floats]:
+    x, w = np.polynomial.legendre.leggauss(count)
+    return x, w
 
 
 @lru_cache(maxsize=_CACHED)

@@ -35,6 +35,7 @@ class Solution:
         self.exponents = np.asarray(series.exponents, dtype=np.float64)
         self.highest = np.zeros((*series.coefficients.shape[2:], system.size, panels.count, panels.nodes))
         """g, (k, b, p, count, N)."""
+        self._later: dict[tuple[int, float], Floats] = {}
         for block in matrix.blocks():
             self._solve(block)
 
@@ -46,7 +47,7 @@ class Solution:
         first = self._powers(component, order, panels.start) + panels.on_start(integral, g[:, :, 0])
         if panels.count == 1:
             return first
-        later = self._later_powers(component, order)
+        later = self._later_powers(component, order).copy()
         local = g[:, :, 1:] @ panels.local(integral).T
         for q in range(1, panels.count):
             later[:, :, q - 1] += local[:, :, q - 1] + panels.memory(integral, g[:, :, :q])
@@ -90,9 +91,11 @@ class Solution:
 
     def _later_powers(self, component: int, order: float) -> Floats:
         """Return what P on the first panel adds to D^order of a coordinate at the nodes of the others, (k, b, q, N)."""
-        times = self.panels.later_times
-        powers = self._powers(component, order, times.ravel(), later=True)
-        return powers.reshape(*powers.shape[:2], *times.shape)
+        if (component, order) not in self._later:
+            times = self.panels.later_times
+            powers = self._powers(component, order, times.ravel(), later=True)
+            self._later[component, order] = powers.reshape(*powers.shape[:2], *times.shape)
+        return self._later[component, order]
 
     def _powers(self, component: int, order: float, times: Floats, later: bool = False) -> Floats:
         """Return what P on the first panel adds to D^order of a coordinate at times on it or `later`, (k, b, t).
