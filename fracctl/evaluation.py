@@ -80,6 +80,15 @@ class Evaluation:
         tail = ("status", "stable", "error_estimate", *COUNTERS)
         return ("initial_condition", *self.design_variables, *measured, *objectives, *tail)
 
+    @property
+    def axes(self) -> Mapping[str, Floats]:
+        """What every survey of this evaluation varies besides design variables; values by column."""
+        return {}
+
+    def findings(self, rows: Mapping[str, Array]) -> list[str]:  # noqa: ARG002 - the optima say it all
+        """Return sentences on rows of the table, for the summary."""
+        return []
+
     def loop(self, design: Mapping[str, Floats | float]) -> ClosedLoop:
         """Return the closed loop, of a batch where `design` holds arrays."""
         return ClosedLoop(self.plant, self.law.from_parameters(self.plant.components, {**self.parameters, **design}))

@@ -28,6 +28,7 @@ BOTTOM_UP = (
     "design",
     "measures",
     "evaluation",
+    "accuracy",
     "surveys",
     "store",
     "config",

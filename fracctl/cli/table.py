@@ -36,7 +36,7 @@ class ResultTable:
 
     def lines(self, summary: Mapping[str, Any]) -> list[str]:
         """Return the table, one part for each objective."""
-        results = summary.get("optima") or [summary]
+        results = summary.get("optima", [summary])
         lines = []
         for name in dict.fromkeys(result.get("objective_name") for result in results):
             of_name = [result for result in results if result.get("objective_name") == name]

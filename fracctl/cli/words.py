@@ -27,8 +27,9 @@ def explain(config: RunConfig, evaluation: Evaluation, survey: Survey) -> list[s
         *_initial_conditions(evaluation),
         ("horizon", _time(evaluation.horizon, evaluation.plant.scales)),
         ("solver", _sentence(evaluation.solver, config.solver.type, _options(config.solver))),
+        ("evaluation", _sentence(evaluation, config.evaluation.type, _options(config.evaluation))),
         *_measures(config, evaluation),
-        *_objectives(config),
+        *_objectives(evaluation),
         *_survey(config, evaluation, survey),
         ("scheduler", _scheduler(config)),
         ("figures", ", ".join(config.figures) or "none"),
@@ -70,7 +71,7 @@ def _initial_conditions(evaluation: Evaluation) -> Iterator[_Row]:
 
 
 def _measures(config: RunConfig, evaluation: Evaluation) -> Iterator[_Row]:
-    measures = zip(config.measures.items(), evaluation.measures, strict=True)
+    measures = zip(config.measures.items(), evaluation.measures, strict=False)
     for place, ((name, options), measure) in enumerate(measures):
         text = _options(options)
         threshold = getattr(options, "threshold", None)
@@ -79,10 +80,10 @@ def _measures(config: RunConfig, evaluation: Evaluation) -> Iterator[_Row]:
         yield "" if place else "measures", _sentence(measure, name, text)
 
 
-def _objectives(config: RunConfig) -> Iterator[_Row]:
-    names = sorted(config.objectives, key=lambda name: name != config.objective)
+def _objectives(evaluation: Evaluation) -> Iterator[_Row]:
+    names = sorted(evaluation.objectives, key=lambda name: name != evaluation.objective)
     for place, name in enumerate(names):
-        factors = config.objectives[name]
+        factors = evaluation.objectives[name]
         mean = f" = ({' · '.join(factors)})^(1/{len(factors)})" if len(factors) > 1 else ""
         yield "" if place else "minimises", f"{name}{mean}" + ("" if place else " (primary)")
 
@@ -97,7 +98,7 @@ def _survey(config: RunConfig, evaluation: Evaluation, survey: Survey) -> Iterat
     for name, spec in config.survey.axes.items():
         values = axis_values(spec, name)
         yield "", f"{name} from {number(values[0])} to {number(values[-1])}, {len(values)} values"
-    if survey.slice is not None:
+    if survey.slice is not None and evaluation.objectives:
         yield "", f"the best point is kept for each {survey.slice}"
     if survey.baseline:
         wanted = ", ".join(f"{name} = {number(value)}" for name, value in survey.baseline.items())

@@ -11,7 +11,7 @@ import numpy as np
 from fracctl.arrays import Floats
 from fracctl.config import registry
 from fracctl.config.options import construct
-from fracctl.config.schemas import GridSurvey, RunConfig, SingleSurvey
+from fracctl.config.schemas import AccuracyEvaluation, GridSurvey, RunConfig, SingleSurvey
 from fracctl.errors import ConfigurationError
 from fracctl.evaluation import Evaluation
 from fracctl.plants import LinearPlant
@@ -21,18 +21,26 @@ from fracctl.surveys import Grid, Single, Survey, axis_values
 def build_evaluation(config: RunConfig) -> Evaluation:
     """Return what turns design points into rows."""
     plant = build_plant(config)
+    common: dict[str, Any] = {
+        "plant": plant,
+        "law": registry.load("controllers", config.controller.type),
+        "parameters": build_parameters(config),
+        "initial_conditions": build_initial_conditions(config, plant),
+        "solver": construct(registry.load("solvers", config.solver.type), config.solver),
+        "horizon": 2.0 * math.pi * config.horizon_periods,
+    }
+    if isinstance(config.evaluation, AccuracyEvaluation):
+        from fracctl import accuracy  # loads all solvers
+
+        options = config.evaluation.model_dump(exclude={"type"})
+        return accuracy.AccuracyEvaluation(**common, measures=(), objectives={}, objective="", **options)
     return Evaluation(
-        plant=plant,
-        law=registry.load("controllers", config.controller.type),
-        parameters=build_parameters(config),
-        initial_conditions=build_initial_conditions(config, plant),
-        solver=construct(registry.load("solvers", config.solver.type), config.solver),
+        **common,
         measures=tuple(
             construct(registry.load("measures", name), options) for name, options in config.measures.items()
         ),
         objectives={name: tuple(columns) for name, columns in config.objectives.items()},
         objective=config.objective,
-        horizon=2.0 * math.pi * config.horizon_periods,
     )
 
 
@@ -40,12 +48,13 @@ def build_survey(config: RunConfig, evaluation: Evaluation) -> Survey:
     """Return what decides which design points are evaluated."""
     parameters = evaluation.parameters
     survey = config.survey
-    if isinstance(survey, SingleSurvey):
+    if isinstance(survey, SingleSurvey) and not evaluation.axes:
         return Single({name: parameters[name] for name in evaluation.design_variables})
-    if isinstance(survey, GridSurvey):
-        axes = {name: axis_values(spec, name) for name, spec in survey.axes.items()}
+    if isinstance(survey, SingleSurvey | GridSurvey):
+        grid = survey if isinstance(survey, GridSurvey) else GridSurvey(type="grid", axes={})
+        axes = {name: axis_values(spec, name) for name, spec in grid.axes.items()} | dict(evaluation.axes)
         fixed = {name: parameters[name] for name in evaluation.design_variables if name not in axes}
-        return Grid(axes, survey.slice, survey.baseline, fixed)
+        return Grid(axes, grid.slice, grid.baseline, fixed)
     built: Survey = construct(registry.load("surveys", survey.type), survey, parameters=parameters)
     return built
 

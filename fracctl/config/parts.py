@@ -112,6 +112,19 @@ def survey(value: Any, info: ValidationInfo, built_in: Mapping[str, type[Typed]]
     return options
 
 
+def setting_lines(resolutions: Mapping[str, Sequence[float]]) -> list[InitErrorDetails]:
+    """Errors of resolutions by solver that the solvers do not take."""
+    from fracctl.accuracy import settings  # loads all solvers
+
+    lines = [] if any(resolutions.values()) else [refusal((), resolutions, "must hold at least one resolution")]
+    for name, values in resolutions.items():
+        try:
+            list(settings({name: values}))
+        except ArgumentError as error:
+            lines.append(refusal((name,), list(values), f"{error.allowed}, but holds {error.value}"))
+    return lines
+
+
 def plant_of(data: Mapping[str, Any]) -> LinearPlant | None:
     """The plant of the fields validated so far, None if it is wrong."""
     options = data.get("plant")

@@ -34,6 +34,28 @@ class GridSurvey(Typed):
     """Values that the point has with which the optimum is compared."""
 
 
+class PerformanceEvaluation(Typed):
+    """Measures of trajectories, and objectives."""
+
+    type: Literal["performance"] = "performance"
+
+
+class AccuracyEvaluation(Typed):
+    """Errors and costs of the solvers."""
+
+    type: Literal["accuracy"]
+    contour: list[Number] = Field(default_factory=list)
+    """Tolerances."""
+    volterra: list[Whole] = Field(default_factory=list)
+    """Nodes on each panel."""
+    collocation: list[Whole] = Field(default_factory=list)
+    """Degrees of the polynomial."""
+    members: Annotated[Whole, Field(ge=1)] = 256
+    """Largest size of the batch that is timed."""
+    repeats: Annotated[Whole, Field(ge=1)] = 3
+    """How often it is timed."""
+
+
 class SerialScheduler(Typed):
     """Everything in the calling process."""
 
@@ -51,7 +73,7 @@ class LocalScheduler(Typed):
 class Figure(Typed):
     """One figure of the run."""
 
-    type: Literal["gain_contours", "trajectories", "objective_against_order"]
+    type: Literal["gain_contours", "trajectories", "objective_against_order", "work_precision"]
     objective: str | None = None
     """Whose optima are shown; None for the primary one."""
     initial_conditions: list[str] | None = None
@@ -59,6 +81,7 @@ class Figure(Typed):
 
 
 SURVEYS: Mapping[str, type[Typed]] = {"single": SingleSurvey, "grid": GridSurvey}
+EVALUATIONS: Mapping[str, type[Typed]] = {"performance": PerformanceEvaluation, "accuracy": AccuracyEvaluation}
 SCHEDULERS: Mapping[str, type[Typed]] = {"serial": SerialScheduler, "local": LocalScheduler}
 
 
@@ -67,12 +90,25 @@ def _survey(value: Any, info: ValidationInfo) -> Typed:
 
 
 def _scheduler(value: Any) -> Typed:
+    return _one_of(SCHEDULERS, value)
+
+
+def _evaluation(value: Any) -> Typed:
+    options = _one_of(EVALUATIONS, value)
+    if isinstance(options, AccuracyEvaluation):
+        lines = parts.setting_lines(options.model_dump(include={"contour", "volterra", "collocation"}))
+        if lines:
+            raise refuse(*lines)
+    return options
+
+
+def _one_of(kinds: Mapping[str, type[Typed]], value: Any) -> Typed:
     given = parts.plain(value)
     name = given.get("type") if isinstance(given, Mapping) else None
-    if name not in SCHEDULERS:
-        hint = suggestion(str(name), SCHEDULERS)
-        raise refuse(refusal(("type",), name, f"must be one of {', '.join(SCHEDULERS)}{hint}"))
-    return SCHEDULERS[str(name)].model_validate(given)
+    if name not in kinds:
+        hint = suggestion(str(name), kinds)
+        raise refuse(refusal(("type",), name, f"must be one of {', '.join(kinds)}{hint}"))
+    return kinds[str(name)].model_validate(given)
 
 
 def _objectives(value: dict[str, list[str]], info: ValidationInfo) -> dict[str, list[str]]:
@@ -147,6 +183,8 @@ class RunConfig(Strict):
     """The primary one."""
     survey: Annotated[Part, PlainValidator(_survey)]
     """Which design points are evaluated."""
+    evaluation: Annotated[Part, PlainValidator(_evaluation)] = PerformanceEvaluation()
+    """What is computed of each."""
     scheduler: Annotated[Part, PlainValidator(_scheduler)] = SerialScheduler()
     """Where."""
     figures: Annotated[dict[Name, Figure], AfterValidator(_figures)] = Field(default_factory=dict)

@@ -103,7 +103,7 @@ class Computation:
 
     def _compute(self) -> dict[str, Any]:
         store = self._evaluate()
-        tally, optima, check = self._tables(store)
+        tally, optima, check, findings = self._tables(store)
         self._trajectories()
         found = results(self._evaluation, optima)
         notes = self._notes + notes_on(found, self._survey.baseline, tally)
@@ -111,6 +111,7 @@ class Computation:
             notes.append(f"stored parts that could not be trusted and were computed again: {store.damaged}")
         notes += notes_on_tails(self._evaluation, found)
         notes += check.notes()
+        notes += findings
         notes += draw_figures(self._directory, self._job.configuration["figures"])
         identity = {
             "experiment": str(self._job.configuration["name"]),
@@ -138,7 +139,7 @@ class Computation:
             raise RunError(f"every point failed: {next(iter(store.failures.values()), 'there is none')}")
         return store
 
-    def _tables(self, store: RowStore) -> tuple[Tally, list[dict[str, Any]], CrossCheck]:
+    def _tables(self, store: RowStore) -> tuple[Tally, list[dict[str, Any]], CrossCheck, list[str]]:
         """Join the parts, select the optima, check a share of the rows and the optima by another solver."""
         evaluation = self._evaluation
         table = evaluations_schema(evaluation, self._metadata)
@@ -148,15 +149,17 @@ class Computation:
             evaluation.objectives, evaluation.design_variables, self._survey.slice, self._survey.baseline
         )
         check = CrossCheck(evaluation, int(self._job.configuration["seed"]))
+        findings: list[str] = []
         for rows in self._directory.stream_evaluations():
             tally.add(rows)
             selection.add(rows)
             check.add(rows)
+            findings += evaluation.findings(rows)
         optima = selection.rows()
         check.add_optima(optima)
         columns = ("kind", "slice", "objective_name", *table.names)
         self._directory.write_optima(schema(columns, COUNTERS, self._metadata), optima)
-        return tally, optima, check
+        return tally, optima, check, findings
 
     def _trajectories(self) -> None:
         optima = self._directory.optima()

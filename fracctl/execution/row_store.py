@@ -85,7 +85,8 @@ class RowStore:
         names = list(self._evaluation.initial_conditions)
         n_rows = block.size * len(names)
         rows: dict[str, Array] = {name: np.full(n_rows, np.nan) for name in self._evaluation.row_columns}
-        rows |= {name: np.full(n_rows, None, dtype=object) for name in ("stable", *COUNTERS)}
+        unknown = set(rows) & {"stable", "solver", *COUNTERS}
+        rows |= {name: np.full(n_rows, None, dtype=object) for name in unknown}
         rows |= {name: np.tile(values, len(names)) for name, values in block.design.items()}
         rows["initial_condition"] = np.repeat(np.array(names, dtype=object), block.size)
         rows["status"] = np.full(n_rows, FAILED, dtype=object)

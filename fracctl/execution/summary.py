@@ -103,7 +103,7 @@ def summarise(
     identity: Mapping[str, str], store: RowStore, found: Sequence[dict[str, Any]], notes: Sequence[str]
 ) -> dict[str, Any]:
     """Return the summary; `identity` holds experiment, run_id and run_directory."""
-    first = found[0]
+    first = found[0] if found else dict.fromkeys(("optimum", "baseline", "change_percent"))
     return {
         **identity,
         "status": "incomplete" if store.failures else "finished",

@@ -15,10 +15,11 @@ POINT = "point"
 REASON = "reason"
 """Why a row failed; null where it did not."""
 
-_TEXT = ("initial_condition", "status", REASON, "kind", "objective_name")
+_TEXT = ("initial_condition", "status", REASON, "kind", "objective_name", "solver")
 _WHOLE = (POINT, "run")
 _FLAGS = ("stable",)
 _UNITS = {
+    "seconds_per_trajectory": "s",
     "_m_per_s": "m/s",
     "_km": "km",
     "_deg": "deg",

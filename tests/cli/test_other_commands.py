@@ -27,7 +27,8 @@ def test_list_names_experiments_and_groups(capsys: pytest.CaptureFixture[str]) -
 @pytest.mark.parametrize("word", ["experiments", "experiment"])
 def test_list_experiments(capsys: pytest.CaptureFixture[str], word: str) -> None:
     found = lines(capsys, "list", word)
-    assert [line.split()[0] for line in found] == ["ic1_outofplane", "ic2_outofplane", "ic3_outofplane", "outofplane"]
+    names = ["ic1_outofplane", "ic2_outofplane", "ic3_outofplane", "outofplane", "solver_accuracy"]
+    assert [line.split()[0] for line in found] == names
     assert "Fastest settling out of plane from IC1" in found[0]
 
 

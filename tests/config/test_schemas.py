@@ -99,8 +99,8 @@ def test_all_errors_come_at_once() -> None:
         (["scheduler=local", "scheduler.workers=1.5"], "scheduler.workers = 1.5: must be a whole number"),
         (["scheduler.workers=2"], "unknown key 'scheduler.workers'; allowed: type"),
         (["scheduler.type=lokal"], "scheduler.type = lokal: must be one of serial, local; did you mean 'local'?"),
-        (["figures.a.type=pie"],
-         "figures.a.type = pie: must be 'gain_contours', 'trajectories' or 'objective_against_order'"),
+        (["figures.a.type=pie"], ("figures.a.type = pie: must be 'gain_contours', 'trajectories', "
+         "'objective_against_order' or 'work_precision'")),
         (["figures.trajectories.objective=fast"], ("figures.trajectories.objective = fast: must be one of the run's "
          "objectives (settling_time, st_os_u)")),
         (["figures.trajectories.initial_conditions=[ic2]"], ("figures.trajectories.initial_conditions = ic2: must be "

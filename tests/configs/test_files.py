@@ -21,6 +21,7 @@ GROUPS = (
     "initial_condition",
     "solver",
     "measures",
+    "evaluation",
     "survey",
     "scheduler",
     "figures",
@@ -47,6 +48,11 @@ TINY = [
     "survey.axes.k_d_w=[1.5,2.0]",
     "scheduler=serial",
 ]
+TINY_SETTINGS = {
+    "solver_accuracy": [f"evaluation.{words}" for words in ("contour=[1e-8]", "volterra=[16]", "collocation=[16]")]
+    + ["evaluation.members=2", "evaluation.repeats=1"]
+}
+"""What else an experiment needs for a tiny budget."""
 
 
 def test_the_groups() -> None:
@@ -75,10 +81,11 @@ def test_an_experiment_bears_its_name(name: str) -> None:
 
 @pytest.mark.parametrize("name", EXPERIMENTS)
 def test_an_experiment_runs_on_a_tiny_budget(name: str, tmp_path: Path) -> None:
-    config = compose([f"experiment={name}", *TINY, f"output_dir={tmp_path}"])
+    config = compose([f"experiment={name}", *TINY, *TINY_SETTINGS.get(name, []), f"output_dir={tmp_path}"])
     result = execute(config)
+    settings = max(1, len(build_checked(config)[0].axes.get("setting", ())))
     assert result.summary["status"] == "finished"
-    assert len(result.evaluations) == 8 * len(config.initial_condition)
+    assert len(result.evaluations) == 8 * settings * len(config.initial_condition)
     assert {path.stem for path in (result.run_directory / "figures").glob("*.pdf")} == set(config.figures)
 
 

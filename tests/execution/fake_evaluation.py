@@ -90,6 +90,9 @@ class FakeEvaluation:
             "nodes": np.arange(size),
         }
 
+    def findings(self, rows: Mapping[str, Any]) -> list[str]:
+        return []
+
     def solve(self, design: Mapping[str, float], initial_condition: str, horizon: float = 10.0) -> FakeTrajectory:
         return FakeTrajectory(design["alpha_w"])
 
