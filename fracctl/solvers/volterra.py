@@ -135,12 +135,12 @@ def _reach(nodes: int) -> float:
     return min(max(nodes - 8.0, 0.25 * nodes), _LONGEST)
 
 
-def respond(members: Members, panels: UniformPanels, highest: float = LARGEST_POWER) -> Values:
+def respond(members: Members, panels: UniformPanels) -> Values:
     """Solve with N and with 7/8 N nodes a panel, from y(0) and y'(0), each (k, b, p) or (k, 1, p)."""
     system = members.system
     shape = (len(members.y0), system.batch or 1, system.size)
     y0, rate = np.broadcast_to(members.y0, shape), np.broadcast_to(members.rate, shape)
-    series = short_time_series(system, y0, rate, highest)
+    series = short_time_series(system, y0, rate, LARGEST_POWER)
     fine = Solution(system, series, panels)
     coarse = Solution(system, series, panels.coarser())
     response = values(system, fine.derivative, coarse.derivative, members.every)
