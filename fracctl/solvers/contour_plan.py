@@ -13,12 +13,10 @@ from fracctl.arrays import Array, Complexes, Floats
 from fracctl.fractional.terms import powers
 from fracctl.panels import Panel, PanelGrid
 from fracctl.solvers.contour_design import ContourShape, design
+from fracctl.solvers.sampling import FIRST_TIME, LOGARITHMIC_NODES, panel_nodes
 
 RATIOS = (3.0, 4.0, 5.0, 6.0, 7.0, 8.0)
 """Last over first time of a window; few values, so that few contours are designed."""
-SERIES_START = 1e-10
-"""First time of the first panel, relative to the horizon: one for all plans, so that grids can be exchanged."""
-SERIES_NODES = 24
 _MOST_CACHED = 16
 """Sets of orders whose kernels a plan keeps."""
 _LONGEST = 36.0
@@ -142,7 +140,7 @@ def make_plan(
     ratio = next(r for r in RATIOS if r**count >= span)
     edges = horizon * ratio ** np.arange(-count, 1.0)
     edges[-1] = horizon
-    panels = [Panel(horizon * SERIES_START, float(edges[0]), SERIES_NODES, logarithmic=True)]
+    panels = [Panel(horizon * FIRST_TIME, float(edges[0]), LOGARITHMIC_NODES, logarithmic=True)]
     groups = [_panels(float(a), float(b), hull, tolerance) for a, b in itertools.pairwise(edges)]
     grid = PanelGrid([*panels, *(panel for group in groups for panel in group)])
     windows, first = [], 1
@@ -171,14 +169,10 @@ def _panels(start: float, end: float, hull: float, tolerance: float) -> list[Pan
     """Split a window so that panels of polynomials resolve both the powers of time at 0 and the oscillation."""
     count = int(np.ceil(0.5 * hull * (end - start) / _LONGEST))
     edges = np.linspace(start, end, max(count, 1) + 1)
-    panels = []
-    for a, b in itertools.pairwise(edges):
-        half, centre = 0.5 * (b - a), 0.5 * (b + a)
-        ellipse = centre / half + np.sqrt((centre / half) ** 2 - 1.0)
-        smooth = -np.log(tolerance) / np.log(ellipse)
-        waves = hull * half
-        panels.append(Panel(float(a), float(b), int(np.ceil(max(smooth, waves + 9.5 * waves ** (1.0 / 3.0), 10.0)))))
-    return panels
+    return [
+        Panel(float(a), float(b), panel_nodes(float(b / a), 0.5 * hull * float(b - a), tolerance))
+        for a, b in itertools.pairwise(edges)
+    ]
 
 
 def _window(shape: ContourShape, where: slice, times: Floats, radius: float, shift: float) -> Window:

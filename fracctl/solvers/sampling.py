@@ -10,9 +10,9 @@ import numpy as np
 from fracctl.panels import Panel
 
 FIRST_TIME = 1e-10
-"""First time of the first panel, relative to the horizon."""
+"""First time of the first panel, relative to the horizon: one for all grids, so that they can be exchanged."""
 _LARGEST_RATIO = 8.0
-_LOGARITHMIC_NODES = 24
+LOGARITHMIC_NODES = 24
 
 
 def graded_panels(
@@ -30,7 +30,7 @@ def graded_panels(
     count = max(int(np.ceil(np.log(end / edge) / np.log(_LARGEST_RATIO))), 1)
     edges = edge * (end / edge) ** (np.arange(count + 1) / count)
     edges[-1] = end
-    panels = [Panel(first, float(edges[0]), _LOGARITHMIC_NODES, logarithmic=True)]
+    panels = [Panel(first, float(edges[0]), LOGARITHMIC_NODES, logarithmic=True)]
     for a, b in itertools.pairwise(edges):
         panels.append(Panel(float(a), float(b), panel_nodes(float(b / a), waves(float(a), float(b)), accuracy)))
     return panels
