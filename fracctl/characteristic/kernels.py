@@ -37,14 +37,22 @@ def _sum(coefficients: Floats, re: Floats, im: Floats, out_re: Floats, out_im: F
 
 
 @compiled
-def _turns(re: Floats, im: Floats) -> tuple[int, bool]:
-    """Counter-clockwise crossings of the negative real axis, and whether a step turned by more than a right angle."""
+def _turns(re: Floats, im: Floats, order: Array) -> tuple[int, bool]:
+    """Counter-clockwise crossings of the negative real axis, and whether a step turned by more than a right angle.
+
+    `order` holds the places of the values in their order along the path.
+    """
     turns, ambiguous = 0, False
-    for n in range(len(re) - 1):
-        if re[n] * re[n + 1] + im[n] * im[n + 1] <= 0.0:
+    here = order[0]
+    for n in range(1, len(order)):
+        there = order[n]
+        if re[here] * re[there] + im[here] * im[there] <= 0.0:
             ambiguous = True
-        elif (im[n] < 0.0) != (im[n + 1] < 0.0) and (re[n] * im[n + 1] - re[n + 1] * im[n]) * (im[n + 1] - im[n]) < 0.0:
-            turns += 1 if im[n + 1] < 0.0 else -1
+        else:
+            area = re[here] * im[there] - re[there] * im[here]
+            if (im[here] < 0.0) != (im[there] < 0.0) and area * (im[there] - im[here]) < 0.0:
+                turns += 1 if im[there] < 0.0 else -1
+        here = there
     return turns, ambiguous
 
 
@@ -54,19 +62,8 @@ def _enclosed(re: Floats, im: Floats, layout: Array, order: Array) -> bool:
     for w in range(len(layout)):
         first = layout[w, 0]
         stop = layout[w + 1, 0] if w + 1 < len(layout) else len(re)
-        here = order[first]
-        if re[here] <= 0.0:
-            return False
-        turns = 0
-        for n in range(first + 1, stop):
-            there = order[n]
-            if re[here] * re[there] + im[here] * im[there] <= 0.0:
-                return False
-            if (im[here] < 0.0) != (im[there] < 0.0):
-                left = (re[here] * im[there] - re[there] * im[here]) * (im[there] - im[here]) < 0.0
-                turns += (1 if im[there] < 0.0 else -1) if left else 0
-            here = there
-        if turns != 0:
+        turns, ambiguous = _turns(re, im, order[first:stop])
+        if turns != 0 or ambiguous or re[order[first]] <= 0.0:
             return False
     return True
 
@@ -227,7 +224,7 @@ def _followed(d_re: Floats, d_im: Floats, factor_re: Floats, factor_im: Floats) 
         x, y = d_re[n], d_im[n]
         d_re[n] = x * factor_re[n] - y * factor_im[n]
         d_im[n] = x * factor_im[n] + y * factor_re[n]
-    turns, doubtful = _turns(d_re, d_im)
+    turns, doubtful = _turns(d_re, d_im, np.arange(length))
     size = abs(d_re[0]) + abs(d_im[0])
     change, room = 0.0, np.inf
     for n in range(length - 1):

@@ -30,6 +30,8 @@ from fracctl.solvers.results import packed, without_trajectory
 _CHUNK = 1536
 """Trajectories solved at once: their transforms stay in the cache."""
 _SMALLEST_TOLERANCE = 1e-12
+_SERIES_ORDER, _COUPLED_SERIES_ORDER = 6, 5
+"""Highest power of time near 0: coupled coordinates have so many powers that a further window is cheaper."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +63,7 @@ class _Group:
 class Contour(BatchSolver):
     """Inverse Laplace transform on contours that enclose all poles.
 
-    Solves linear loops of second order with linear fractional laws (orders in [-1, 2], auxiliary states), any batch
+    Solves linear loops of second order with linear fractional laws (orders in [-1, 2), auxiliary states), any batch
     of gains; fast where the members share their orders.
 
     Args:
@@ -84,13 +86,14 @@ class Contour(BatchSolver):
     def _solved(self, members: Members, rows: Array, radius: Floats, shift: Floats) -> Iterator[Survey]:
         """Solve `rows`; those that miss the tolerance again, the last time as they come out."""
         cost = np.zeros(len(radius), dtype=np.int64)
+        single = members.system.size == 1
         for attempt in _ATTEMPTS:
             missed: list[Array] = []
             for group in _classes(rows, radius, shift, attempt.ratio, max(_CHUNK // len(members.y0), 1)):
                 tolerance = max(attempt.safety * self.tolerance, _SMALLEST_TOLERANCE)
                 try:
-                    hull = group.radius * (attempt.width if members.system.size == 1 else attempt.coupled)
-                    order = 6 if members.system.size == 1 else 5
+                    hull = group.radius * (attempt.width if single else attempt.coupled)
+                    order = _SERIES_ORDER if single else _COUPLED_SERIES_ORDER
                     plan = make_plan(members.horizon, hull, group.radius, group.shift, tolerance, order)
                 except UnsupportedError:
                     if members.every:

@@ -122,9 +122,7 @@ def _parts(values: Complexes) -> tuple[Floats, Floats]:
 
 
 @lru_cache(maxsize=64)
-def make_plan(
-    horizon: float, hull: float, radius: float, shift: float, tolerance: float, series_order: int = 6
-) -> Plan:
+def make_plan(horizon: float, hull: float, radius: float, shift: float, tolerance: float, series_order: int) -> Plan:
     """Return the plan for poles with Re σ ≤ shift, |Im σ| ≤ hull, all within |σ| < radius.
 
     Args:
