@@ -1,4 +1,4 @@
-"""How far a run is, on standard error: rows done, rate, time left."""
+"""How far a run is, on standard error: points done, rate, time left."""
 
 from __future__ import annotations
 
@@ -42,16 +42,16 @@ class Bar:
         )
         self._task = self._rich.add_task(label, total=None, rate="")
 
-    def start(self, total_rows: int | None) -> None:
+    def start(self, total_points: int | None) -> None:
         """Show the bar; without a total it only counts."""
-        self._rich.update(self._task, total=total_rows)
+        self._rich.update(self._task, total=total_points)
         self._rich.start()
 
-    def advance(self, rows: int) -> None:
-        """Add rows."""
+    def advance(self, points: int) -> None:
+        """Add points."""
         speed = self._rich.tasks[0].speed
-        rate = f"{speed:,.0f} rows/s".replace(",", " ") if speed else ""
-        self._rich.update(self._task, advance=rows, rate=rate)
+        rate = f"{speed:,.0f} points/s".replace(",", " ") if speed else ""
+        self._rich.update(self._task, advance=points, rate=rate)
 
     def finish(self) -> None:
         """Remove the bar."""

@@ -98,8 +98,8 @@ def _survey(config: RunConfig, evaluation: Evaluation, survey: Survey) -> Iterat
     for name, spec in config.survey.axes.items():
         values = axis_values(spec, name)
         yield "", f"{name} from {number(values[0])} to {number(values[-1])}, {len(values)} values"
-    if survey.slice is not None and evaluation.objectives:
-        yield "", f"the best point is kept for each {survey.slice}"
+    if survey.slices and evaluation.objectives:
+        yield "", f"the best point is kept for each {' and '.join(survey.slices)}"
     if survey.baseline:
         wanted = ", ".join(f"{name} = {number(value)}" for name, value in survey.baseline.items())
         yield "", f"compared with the best point of {wanted}"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 
 @dataclass(frozen=True)
@@ -21,6 +22,8 @@ class Parameter:
     """Upper end of the range, itself allowed."""
     lower_allowed: bool = True
     """Whether the lower end itself is allowed."""
+    kind: Literal["gain", "order", "time", "weight"] = "gain"
+    """What it is: surveys vary gains and orders in different ways."""
 
     def contains(self, value: float) -> bool:
         """Whether `value` lies in the range; False for NaN and infinities."""

@@ -48,7 +48,10 @@ class PDAlpha:
     @staticmethod
     def parameters(components: Sequence[str]) -> tuple[Parameter, ...]:
         """Return alpha_…, k_p_…, k_d_… for the given components, in the order of the tables' columns."""
-        alphas = [Parameter(f"alpha_{c}", default=1.0, lower=0.0, upper=1.0, lower_allowed=False) for c in components]
+        alphas = [
+            Parameter(f"alpha_{c}", default=1.0, lower=0.0, upper=1.0, lower_allowed=False, kind="order")
+            for c in components
+        ]
         gains = [Parameter(name) for p in ("k_p", "k_d") for row in entry_names(p, components) for name in row]
         return tuple(alphas + gains)
 

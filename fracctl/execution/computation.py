@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
 
 from fracctl.errors import RunError
 from fracctl.evaluation import COUNTERS
@@ -71,6 +72,10 @@ class Computation:
             "fracctl.provenance": canonical_json(self._record.provenance),
         }
 
+    @property
+    def _evaluations_schema(self) -> pa.Schema:
+        return evaluations_schema(self._evaluation, self._survey.columns, self._metadata)
+
     def run(self) -> None:
         """Compute what is missing; afterwards the directory holds a finished or an incomplete run.
 
@@ -121,14 +126,13 @@ class Computation:
         return summarise(identity, store, found, notes) | check.summary()
 
     def _evaluate(self) -> RowStore:
-        store = RowStore(self._directory, self._evaluation, evaluations_schema(self._evaluation, self._metadata))
+        store = RowStore(self._directory, self._evaluation, self._evaluations_schema)
         executor = make_executor(self._scheduler, self._survey.n_points)
         in_flight = 2 * self._workers if self._workers > 1 else 1
         scheduler = Scheduler(self._survey, executor, self._job.work, store, in_flight, self._progress.advance)
         versions = self._record.provenance["versions"]
         _log.info("fracctl %s, %s, workers: %d", versions["fracctl"], self._scheduler["type"], self._workers)
-        n_points, n_conditions = self._survey.n_points, len(self._evaluation.initial_conditions)
-        self._progress.start(None if n_points is None else n_points * n_conditions)
+        self._progress.start(self._survey.n_points)
         try:
             scheduler.run()
         finally:
@@ -142,11 +146,11 @@ class Computation:
     def _tables(self, store: RowStore) -> tuple[Tally, list[dict[str, Any]], CrossCheck, list[str]]:
         """Join the parts, select the optima, check a share of the rows and the optima by another solver."""
         evaluation = self._evaluation
-        table = evaluations_schema(evaluation, self._metadata)
+        table = self._evaluations_schema
         self._directory.write_evaluations(table, store.tables())
         tally = Tally()
         selection = Optima(
-            evaluation.objectives, evaluation.design_variables, self._survey.slice, self._survey.baseline
+            evaluation.objectives, evaluation.design_variables, self._survey.slices, self._survey.baseline
         )
         check = CrossCheck(evaluation, int(self._job.configuration["seed"]))
         findings: list[str] = []

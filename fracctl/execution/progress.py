@@ -8,12 +8,12 @@ from typing import Protocol
 class Progress(Protocol):
     """Told from the parent process only, in its main thread."""
 
-    def start(self, total_rows: int | None) -> None:
-        """Begin; `total_rows` is None where it is not known beforehand."""
+    def start(self, total_points: int | None) -> None:
+        """Begin; `total_points` is None where it is not known beforehand."""
         ...
 
-    def advance(self, rows: int) -> None:
-        """So many further rows are stored."""
+    def advance(self, points: int) -> None:
+        """So many further points are stored."""
         ...
 
     def finish(self) -> None:
@@ -24,10 +24,10 @@ class Progress(Protocol):
 class NoProgress:
     """Shows nothing."""
 
-    def start(self, total_rows: int | None) -> None:
+    def start(self, total_points: int | None) -> None:
         """Ignore."""
 
-    def advance(self, rows: int) -> None:
+    def advance(self, points: int) -> None:
         """Ignore."""
 
     def finish(self) -> None:

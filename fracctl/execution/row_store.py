@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
 import numpy as np
 import pyarrow as pa
@@ -12,11 +12,11 @@ import pyarrow as pa
 from fracctl.arrays import Array
 from fracctl.evaluation import COUNTERS, Evaluation
 from fracctl.execution.worker import Outcome
-from fracctl.store.columns import POINT, REASON, schema
+from fracctl.store.columns import REASON, schema
 from fracctl.store.parts import Parts
 from fracctl.store.run_directory import RunDirectory
 from fracctl.surveys import Block
-from fracctl.surveys.base import Rows
+from fracctl.surveys.base import POINT, Rows
 
 FAILED = "failed"
 """Status of the points of a block that could not be computed."""
@@ -24,9 +24,9 @@ FAILED = "failed"
 _log = logging.getLogger(__name__)
 
 
-def evaluations_schema(evaluation: Evaluation, metadata: Mapping[str, str]) -> pa.Schema:
-    """Return the schema of ``evaluations.parquet``: `point`, the evaluation's columns, `reason`."""
-    return schema((POINT, *evaluation.row_columns, REASON), COUNTERS, metadata)
+def evaluations_schema(evaluation: Evaluation, further: Iterable[str], metadata: Mapping[str, str]) -> pa.Schema:
+    """Return the schema of ``evaluations.parquet``: `point`, the evaluation's columns, the survey's, `reason`."""
+    return schema((POINT, *evaluation.row_columns, *further, REASON), COUNTERS, metadata)
 
 
 class RowStore:
@@ -67,7 +67,7 @@ class RowStore:
         """Store what became of a block and return its rows."""
         rows = dict(outcome.rows) if outcome.rows is not None else self._failed_rows(block, str(outcome.reason))
         n_conditions = len(self._evaluation.initial_conditions)
-        rows[POINT] = np.tile(np.arange(block.first_point, block.first_point + block.size), n_conditions)
+        rows[POINT] = block.first_point + rows.get(POINT, np.tile(np.arange(block.size), n_conditions))
         self._parts.save(block.number, rows, outcome.reason)
         self.numbers.append(block.number)
         self.foreign_cpu_time_s += outcome.cpu_time_s if outcome.process != os.getpid() else 0.0

@@ -44,7 +44,7 @@ class Scheduler:
         work: the evaluation.
         store: keeps the rows of finished blocks, and answers for those it has.
         in_flight: how many blocks are submitted at a time.
-        advance: called with the number of rows of each block that is stored.
+        advance: called with the number of points of each block that is stored.
 
     Raises:
         RunError: workers die one after the other, or the store cannot be written.
@@ -87,7 +87,7 @@ class Scheduler:
             block = self._next()
             if block is None:
                 return
-            self._pending[self._executor.submit(evaluate, self._work, block.design)] = block
+            self._pending[self._executor.submit(evaluate, self._work, block)] = block
 
     def _next(self) -> Block | None:
         """The next block that is not stored; those that are, are told on the way."""
@@ -132,7 +132,7 @@ class Scheduler:
 
     def _tell(self, block: Block, rows: Rows) -> None:
         self._survey.tell(block.number, rows)
-        self._advance(len(next(iter(rows.values()))))
+        self._advance(block.size)
 
     def _abandon(self) -> None:
         self._executor.shutdown(cancel_futures=True)

@@ -9,12 +9,12 @@ from typing import Any
 
 from fracctl.evaluation import Evaluation
 from fracctl.execution.row_store import RowStore
-from fracctl.store.columns import POINT, REASON
-from fracctl.surveys.base import Rows
+from fracctl.store.columns import REASON
+from fracctl.surveys.base import POINT, SEARCHED_FOR, Rows
 
 Optimum = Mapping[str, Any]
 
-_ADDED_COLUMNS = ("kind", "slice", "objective_name", POINT, REASON)
+_ADDED_COLUMNS = ("kind", "slice", "objective_name", POINT, REASON, SEARCHED_FOR)
 _OPTIMUM_NEEDS = "an optimum has status ok, a finite value, and some control effort if that is part of it"
 
 

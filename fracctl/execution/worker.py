@@ -12,8 +12,9 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
-from fracctl.arrays import Array, Floats
+from fracctl.arrays import Array
 from fracctl.errors import FracctlError
+from fracctl.surveys.base import POINT, SEARCH_COLUMNS, Block
 
 if TYPE_CHECKING:
     from fracctl.evaluation import Evaluation
@@ -61,13 +62,13 @@ class Outcome:
     """Process that it ran in."""
 
 
-def evaluate(work: Work, design: Mapping[str, Floats]) -> Outcome:
-    """Evaluate a block; whatever goes wrong in it becomes an outcome with a reason."""
+def evaluate(work: Work, block: Block) -> Outcome:
+    """Evaluate a block, or search from it; whatever goes wrong in it becomes an outcome with a reason."""
     started = time.process_time()
     try:
         evaluation = work.evaluation()
-        rows = evaluation(design)
-        _check(rows, evaluation, design)
+        rows = evaluation(block.design) if block.search is None else block.search(evaluation, block.design)
+        _check(rows, evaluation, block)
     except (Exception, SystemExit) as problem:  # noqa: BLE001 - becomes a row with its reason
         return Outcome(None, describe(problem), traceback.format_exc())
     return Outcome(rows, cpu_time_s=time.process_time() - started, process=os.getpid())
@@ -79,8 +80,12 @@ def describe(problem: BaseException) -> str:
     return f"{name}{problem}".splitlines()[0].strip().removesuffix(":")
 
 
-def _check(rows: Mapping[str, Array], evaluation: Evaluation, design: Mapping[str, Floats]) -> None:
-    expected = len(next(iter(design.values()))) * len(evaluation.initial_conditions)
-    wrong = [name for name in evaluation.row_columns if name not in rows or len(rows[name]) != expected]
+def _check(rows: Mapping[str, Array], evaluation: Evaluation, block: Block) -> None:
+    if block.search is None:
+        wanted, expected = evaluation.row_columns, block.size * len(evaluation.initial_conditions)
+    else:
+        wanted = (*evaluation.row_columns, POINT, *SEARCH_COLUMNS)
+        expected = max(block.size, *map(len, rows.values()))
+    wrong = [name for name in wanted if name not in rows or len(rows[name]) != expected]
     if wrong:
         raise ValueError(f"the evaluation must return {expected} values of {', '.join(wrong)}")

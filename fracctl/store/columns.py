@@ -9,14 +9,13 @@ import numpy as np
 import pyarrow as pa
 
 from fracctl.arrays import Array
+from fracctl.surveys.base import EVALUATIONS_SPENT, POINT, SEARCHED_FOR
 
-POINT = "point"
-"""Number of the design point in its survey."""
 REASON = "reason"
 """Why a row failed; null where it did not."""
 
-_TEXT = ("initial_condition", "status", REASON, "kind", "objective_name", "solver")
-_WHOLE = (POINT, "run")
+_TEXT = ("initial_condition", "status", REASON, "kind", "objective_name", "solver", SEARCHED_FOR)
+_WHOLE = (POINT, "run", EVALUATIONS_SPENT)
 _FLAGS = ("stable",)
 _UNITS = {
     "seconds_per_trajectory": "s",

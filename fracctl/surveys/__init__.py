@@ -1,9 +1,9 @@
 """Surveys: which design points to evaluate, in blocks, and which of them are optima; no files, no processes."""
 
 from fracctl.surveys.axes import axis_values
-from fracctl.surveys.base import Block, Survey
+from fracctl.surveys.base import Block, Search, Survey
 from fracctl.surveys.grid import Grid
 from fracctl.surveys.optima import Optima
 from fracctl.surveys.single import Single
 
-__all__ = ["Block", "Grid", "Optima", "Single", "Survey", "axis_values"]
+__all__ = ["Block", "Grid", "Optima", "Search", "Single", "Survey", "axis_values"]

@@ -1,4 +1,4 @@
-"""What a survey is: it asks for blocks of design points and is told their rows."""
+"""What a survey is: it asks for blocks of design points, or of searches from them, and is told their rows."""
 
 from __future__ import annotations
 
@@ -7,14 +7,40 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from fracctl.arrays import Array, Floats
+from fracctl.evaluation import Evaluation
 
 Rows = Mapping[str, Array]
 """Rows of a table: arrays of one length by column name."""
 
+POINT = "point"
+"""Number of the design point in its survey; in the rows of a search, that of its start."""
+SEARCHED_FOR = "searched_for"
+"""Name of the objective whose search a row belongs to; None where it counts for all."""
+EVALUATIONS_SPENT = "evaluations_spent"
+"""How many evaluations the search of a row had spent when it came to it."""
+SEARCH_COLUMNS = (SEARCHED_FOR, EVALUATIONS_SPENT)
+
+
+class Search(Protocol):
+    """Leads from starts to better points, all of it where the block runs; plain data, for it is sent there."""
+
+    def __call__(self, evaluation: Evaluation, starts: Mapping[str, Floats]) -> dict[str, Array]:
+        """Return the path of the search.
+
+        Args:
+            evaluation: of design points.
+            starts: every design variable by name, (b,).
+
+        Returns:
+            The evaluation's columns, `SEARCH_COLUMNS`, and `POINT`, the place of the row's start in `starts`: first
+            the b starts in their order, then every improvement.
+        """
+        ...
+
 
 @dataclass(frozen=True)
 class Block:
-    """Design points that are evaluated together, always as a whole."""
+    """Design points that are evaluated together, or searches from them; always as a whole."""
 
     number: int
     """Counts the survey's blocks from 0; also the name of the stored part."""
@@ -22,6 +48,8 @@ class Block:
     """Number of the first of its points in the survey; the others follow it."""
     design: Mapping[str, Floats]
     """Every design variable by name, (b,)."""
+    search: Search | None = None
+    """What starts from these points; None where they are evaluated only."""
 
     @property
     def size(self) -> int:
@@ -42,8 +70,13 @@ class Survey(Protocol):
         ...
 
     @property
-    def slice(self) -> str | None:
-        """The design variable for each value of which an optimum is stored."""
+    def columns(self) -> tuple[str, ...]:
+        """Columns that its rows have besides those of the evaluation."""
+        ...
+
+    @property
+    def slices(self) -> tuple[str, ...]:
+        """The design variables for each combination of whose values an optimum is stored."""
         ...
 
     @property

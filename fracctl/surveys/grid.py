@@ -38,6 +38,8 @@ class Grid:
             also fixed.
     """
 
+    columns: tuple[str, ...] = ()
+
     def __init__(
         self,
         axes: Mapping[str, Floats],
@@ -45,22 +47,22 @@ class Grid:
         baseline: Mapping[str, float] | None = None,
         fixed: Mapping[str, float] | None = None,
     ) -> None:
-        self.slice = slice
+        self.slices = () if slice is None else (slice,)
         self.baseline: Mapping[str, float] = dict(baseline or {})
         self._fixed = dict(fixed or {})
         self._check(axes)
-        first = [slice] if slice is not None else []
-        names = first + [name for name in axes if name != slice]
+        names = [*self.slices, *(name for name in axes if name not in self.slices)]
         self._axes = {name: np.asarray(axes[name], dtype=np.float64) for name in names}
         self._shape = tuple(values.size for values in self._axes.values())
-        self._ends = _block_ends(self.n_points, self._shape[0] if slice is not None else 1)
+        self._ends = _block_ends(self.n_points, self._shape[0] if self.slices else 1)
         self._asked = 0
         self._told: set[int] = set()
 
     def _check(self, axes: Mapping[str, Floats]) -> None:
         known = ", ".join([*axes, *self._fixed])
-        if self.slice is not None and self.slice not in axes:
-            raise ArgumentError("slice", repr(self.slice), f"must be one of the axes ({', '.join(axes)})")
+        for name in self.slices:
+            if name not in axes:
+                raise ArgumentError("slice", repr(name), f"must be one of the axes ({', '.join(axes)})")
         for name in self.baseline:
             if name not in axes and name not in self._fixed:
                 raise ArgumentError("baseline", repr(name), f"must name design variables ({known})")

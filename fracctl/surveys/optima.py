@@ -9,25 +9,25 @@ from typing import Any
 import numpy as np
 
 from fracctl.arrays import Booleans
-from fracctl.surveys.base import Rows
+from fracctl.surveys.base import SEARCHED_FOR, Rows
 
 KINDS = ("overall", "baseline", "slice")
 
 _Key = tuple[float, ...]
-_Place = tuple[str, str, str, float | None]
+_Place = tuple[str, str, str, tuple[float, ...]]
 
 
 class Optima:
     """Selects optima from rows that come part by part; holds the best rows only.
 
     A candidate has status ``ok``, is not known to be unstable, and has a finite objective. A combined objective needs
-    a control effort other than 0. Ties go to the smallest control effort, then to the lexicographically smallest
-    design variables.
+    a control effort other than 0. The rows of a search count for the objective that was searched for. Ties go to the
+    smallest control effort, then to the lexicographically smallest design variables.
 
     Args:
         objectives: measure columns by name of the objective; its values are the column ``objective_<name>``.
         design_variables: their columns, in the order of the tables.
-        slice: the design variable for each value of which an optimum is selected.
+        slices: the design variables for each combination of whose values an optimum is selected.
         baseline: values of design variables that the points of kind ``baseline`` have.
     """
 
@@ -35,12 +35,12 @@ class Optima:
         self,
         objectives: Mapping[str, Sequence[str]],
         design_variables: Sequence[str],
-        slice: str | None = None,  # noqa: A002 - the name in the configuration
+        slices: Sequence[str] = (),
         baseline: Mapping[str, float] | None = None,
     ) -> None:
         self._objectives = objectives
         self._design_variables = tuple(design_variables)
-        self._slice = slice
+        self._slices = tuple(slices)
         self._baseline = dict(baseline or {})
         self._initial_conditions: list[str] = []
         self._best: dict[_Place, tuple[_Key, dict[str, Any]]] = {}
@@ -57,35 +57,40 @@ class Optima:
     def rows(self) -> list[dict[str, Any]]:
         """Return the optima: `kind`, `slice`, `objective_name`, then the columns of the rows.
 
-        Sorted by objective and initial condition as they were given, then overall, baseline, slices ascending.
+        `slice` is the value of the one variable that has slices, None where there are several or none. Sorted by
+        objective and initial condition as they were given, then overall, baseline, slices ascending.
         """
         return [
-            {"kind": kind, "slice": value, "objective_name": objective, **row}
+            {"kind": kind, "slice": values[0] if len(values) == 1 else None, "objective_name": objective, **row}
             for objective in self._objectives
             for name in self._initial_conditions
             for kind in KINDS
-            for value, row in self._of(objective, name, kind)
+            for values, row in self._of(objective, name, kind)
         ]
 
-    def _of(self, objective: str, name: str, kind: str) -> Iterator[tuple[float | None, dict[str, Any]]]:
+    def _of(self, objective: str, name: str, kind: str) -> Iterator[tuple[tuple[float, ...], dict[str, Any]]]:
         found = [(key[3], row) for key, (_, row) in self._best.items() if key[:3] == (objective, name, kind)]
-        yield from sorted(found, key=lambda item: item[0] or 0.0)
+        yield from sorted(found, key=lambda item: item[0])
 
     def _candidates(self, rows: Rows, objective: str) -> Booleans:
         unstable = np.equal(np.asarray(rows["stable"], dtype=object), False)
         allowed: Booleans = (rows["status"] == "ok") & ~unstable & np.isfinite(rows[f"objective_{objective}"])
         if len(self._objectives[objective]) > 1 and "control_effort" in rows:
             allowed &= rows["control_effort"] != 0.0
+        if SEARCHED_FOR in rows:
+            allowed &= np.isin(rows[SEARCHED_FOR], np.array([objective, None], dtype=object))
         return allowed
 
     def _add(self, rows: Rows, objective: str, name: str, allowed: Booleans) -> None:
-        self._offer(rows, allowed, (objective, name, "overall", None))
+        self._offer(rows, allowed, (objective, name, "overall", ()))
         if self._baseline:
             matching = np.logical_and.reduce([rows[column] == value for column, value in self._baseline.items()])
-            self._offer(rows, allowed & matching, (objective, name, "baseline", None))
-        if self._slice is not None:
-            for value in np.unique(rows[self._slice][allowed]).tolist():
-                self._offer(rows, allowed & (rows[self._slice] == value), (objective, name, "slice", value))
+            self._offer(rows, allowed & matching, (objective, name, "baseline", ()))
+        if self._slices:
+            table = np.stack([rows[column] for column in self._slices], axis=-1)
+            for values in np.unique(table[allowed], axis=0):
+                inside = allowed & (table == values).all(axis=1)
+                self._offer(rows, inside, (objective, name, "slice", tuple(values.tolist())))
 
     def _offer(self, rows: Rows, allowed: Booleans, place: _Place) -> None:
         (where,) = np.nonzero(allowed)

@@ -17,7 +17,8 @@ class Single:
     """
 
     n_points = 1
-    slice: str | None = None
+    columns: tuple[str, ...] = ()
+    slices: tuple[str, ...] = ()
 
     def __init__(self, point: Mapping[str, float]) -> None:
         self.baseline: Mapping[str, float] = {}

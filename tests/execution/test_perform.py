@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -25,20 +25,20 @@ from tests.store.disks import full_after, small_disk
 
 
 class Watch:
-    """A progress that remembers, and interrupts after some rows."""
+    """A progress that remembers, and interrupts after some points."""
 
     def __init__(self, interrupt_after: int | None = None) -> None:
         self.total: int | None = None
-        self.rows = 0
+        self.points = 0
         self.finished = False
         self._interrupt_after = interrupt_after
 
-    def start(self, total_rows: int | None) -> None:
-        self.total = total_rows
+    def start(self, total_points: int | None) -> None:
+        self.total = total_points
 
-    def advance(self, rows: int) -> None:
-        self.rows += rows
-        if self._interrupt_after is not None and self.rows >= self._interrupt_after:
+    def advance(self, points: int) -> None:
+        self.points += points
+        if self._interrupt_after is not None and self.points >= self._interrupt_after:
             raise KeyboardInterrupt
 
     def finish(self) -> None:
@@ -190,7 +190,7 @@ def test_a_damaged_run_is_computed_again_with_a_note(tmp_path: Path, undisturbed
     assert RunDirectory(again.run_directory).verify() == []
 
 
-@pytest.mark.parametrize("after", [1, N_POINTS, 2 * N_POINTS])
+@pytest.mark.parametrize("after", [1, N_POINTS // 2, N_POINTS])
 def test_an_interrupted_run_continues(tmp_path: Path, undisturbed: Path, after: int) -> None:
     watch = Watch(interrupt_after=after)
     with pytest.raises(KeyboardInterrupt):
@@ -220,7 +220,7 @@ def test_a_damaged_part_is_computed_again(tmp_path: Path, undisturbed: Path) -> 
 def test_progress_counts_every_row(tmp_path: Path) -> None:
     watch = Watch()
     perform(job(tmp_path), progress=watch)
-    assert (watch.total, watch.rows, watch.finished) == (2 * N_POINTS, 2 * N_POINTS, True)
+    assert (watch.total, watch.points, watch.finished) == (N_POINTS, N_POINTS, True)
 
 
 @pytest.mark.parametrize("kind", ["raises", "exits", "returns nonsense"])
@@ -300,7 +300,7 @@ class Descent:
     """A search: each of four blocks is a row of gains about the best point of the block before."""
 
     n_points = None
-    slice = None
+    columns = slices = ()
     baseline: Mapping[str, float] = {}
 
     def __init__(self) -> None:
@@ -332,10 +332,63 @@ def test_a_search_continues_by_replay(tmp_path: Path) -> None:
     whole = perform(search(tmp_path / "whole"))
     assert whole.optima["k_p_w"].iloc[0] == pytest.approx(0.9)
     with pytest.raises(KeyboardInterrupt):
-        perform(search(tmp_path / "parts"), progress=Watch(interrupt_after=20))
+        perform(search(tmp_path / "parts"), progress=Watch(interrupt_after=10))
     continued = perform(search(tmp_path / "parts"))
     assert "4 blocks: 2 were stored" in (continued.run_directory / "run.log").read_text()
     assert tables_of(continued.run_directory) == tables_of(whole.run_directory)
+
+
+@dataclass(frozen=True)
+class Steps:
+    """A search: one step of each start towards the bottom of the bowl, for one initial condition."""
+
+    searched_for: str
+
+    def __call__(self, evaluation: Any, starts: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+        first = evaluation.initial_conditions
+        evaluation.initial_conditions = {"one": first["one"]}
+        parts = [evaluation(starts), evaluation(dict(starts) | {"k_p_w": starts["alpha_w"]})]
+        evaluation.initial_conditions = first
+        rows = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+        size = len(starts["alpha_w"])
+        rows["searched_for"] = np.full(2 * size, self.searched_for, dtype=object)
+        rows["evaluations_spent"] = np.repeat([1, 2], size)
+        return rows | {"point": np.tile(np.arange(size), 2)}
+
+
+class Searches(Descent):
+    """Two blocks of two searches each, the second for another objective."""
+
+    n_points = 4
+    columns = ("searched_for", "evaluations_spent")
+
+    @property
+    def finished(self) -> bool:
+        return self._told == 2
+
+    def ask(self) -> list[Block]:
+        if self._asked:
+            return []
+        self._asked = 2
+        design = {"alpha_w": np.full(2, 0.9), "k_p_w": np.array([0.5, 2.0]), "k_d_w": np.full(2, 1.8)}
+        return [Block(i, 2 * i, design, Steps(name)) for i, name in enumerate(("time", "joint"))]
+
+    def tell(self, number: int, rows: Rows) -> None:
+        self._told += 1
+
+
+def test_the_rows_of_searches_are_their_paths(tmp_path: Path) -> None:
+    result = perform(search(tmp_path, Searches))
+    rows = result.evaluations
+    assert rows["point"].tolist() == [0, 1, 0, 1, 2, 3, 2, 3]
+    assert rows["evaluations_spent"].tolist() == [1, 1, 2, 2] * 2
+    assert rows["searched_for"].tolist() == ["time"] * 4 + ["joint"] * 4
+    assert set(rows["initial_condition"]) == {"one"}
+    found = result.optima.set_index("objective_name")
+    assert found.loc["time", "searched_for"] == "time"
+    assert found.loc["joint", "searched_for"] == "joint"
+    again = perform(search(tmp_path, Searches))
+    assert again.reused
 
 
 def test_rows_of_other_points_answer_no_question(tmp_path: Path) -> None:
@@ -345,7 +398,7 @@ def test_rows_of_other_points_answer_no_question(tmp_path: Path) -> None:
             self._centre = 0.05
 
     with pytest.raises(KeyboardInterrupt):
-        perform(search(tmp_path), progress=Watch(interrupt_after=20))
+        perform(search(tmp_path), progress=Watch(interrupt_after=10))
     other = perform(search(tmp_path, Elsewhere))
     assert "4 blocks: 0 were stored" in (other.run_directory / "run.log").read_text()
     assert len(other.evaluations) == 2 * 28

@@ -90,7 +90,7 @@ def test_slices_and_baseline() -> None:
     table = rows(
         *({"a": a, "k": k, "settling_time": a * (2.0 + (k - 2.0) ** 2)} for a in (0.8, 0.9, 1.0) for k in (1.0, 2.0))
     )
-    found = optima(table, slice="a", baseline={"a": 1.0})
+    found = optima(table, slices=("a",), baseline={"a": 1.0})
     assert [(r["kind"], r["slice"], r["a"], r["k"]) for r in found if r["objective_name"] == "time"] == [
         ("overall", None, 0.8, 2.0),
         ("baseline", None, 1.0, 2.0),
@@ -126,12 +126,12 @@ def test_parts_make_no_difference() -> None:
         for a in range(4)
         for k in range(12)
     ]
-    whole = optima(rows(*entries), slice="a", baseline={"a": 1.0})
+    whole = optima(rows(*entries), slices=("a",), baseline={"a": 1.0})
     assert len(whole) == 2 * 6
     for size in (1, 5, 16):
         parts = [rows(*entries[i : i + size]) for i in range(0, len(entries), size)]
-        assert optima(*parts, slice="a", baseline={"a": 1.0}) == whole
-        assert optima(*reversed(parts), slice="a", baseline={"a": 1.0}) == whole
+        assert optima(*parts, slices=("a",), baseline={"a": 1.0}) == whole
+        assert optima(*reversed(parts), slices=("a",), baseline={"a": 1.0}) == whole
 
 
 def test_values_are_plain() -> None:
