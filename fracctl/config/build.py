@@ -55,7 +55,8 @@ def build_survey(config: RunConfig, evaluation: Evaluation) -> Survey:
         axes = {name: axis_values(spec, name) for name, spec in grid.axes.items()} | dict(evaluation.axes)
         fixed = {name: parameters[name] for name in evaluation.design_variables if name not in axes}
         return Grid(axes, grid.slice, grid.baseline, fixed)
-    built: Survey = construct(registry.load("surveys", survey.type), survey, parameters=parameters)
+    factory = registry.load("surveys", survey.type)
+    built: Survey = construct(factory, survey, evaluation=evaluation, seed=config.seed)
     return built
 
 

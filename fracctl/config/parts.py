@@ -102,7 +102,7 @@ def survey(value: Any, info: ValidationInfo, built_in: Mapping[str, type[Typed]]
     value = plain(value)
     factory = factory_of("surveys", value)
     if value["type"] not in built_in:
-        return typed_options_of(factory, omitted=("parameters",)).model_validate(value)
+        return typed_options_of(factory, omitted=("evaluation", "seed")).model_validate(value)
     options = built_in[value["type"]].model_validate(value)
     parameters = parameters_of(info.data)
     if value["type"] == "grid":

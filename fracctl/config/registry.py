@@ -7,7 +7,7 @@ An extension declares, for instance::
 
 and `type: my_plant` works wherever `hcw` does. The options are the arguments of the class, with their annotations and
 defaults; an `ArgumentError` from the constructor is reported under the option's name. A survey is called with the
-keyword `parameters` (the controller's configured values) besides its options.
+keywords `evaluation` and `seed` besides its options.
 """
 
 from __future__ import annotations

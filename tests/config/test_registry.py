@@ -39,8 +39,8 @@ MODULE = """
             return {"peak": abs(trajectory.positions).max(axis=(1, 2)) * self.scale}
 
     class Twice(Single):
-        def __init__(self, parameters, factor: float = 2.0) -> None:
-            super().__init__({name: factor * value for name, value in parameters.items()})
+        def __init__(self, evaluation, seed: int, factor: float = 2.0) -> None:
+            super().__init__({name: factor * value for name, value in evaluation.parameters.items()})
 """
 
 ENTRY_POINTS = """
