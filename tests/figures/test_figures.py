@@ -15,13 +15,20 @@ import pytest
 from matplotlib.axes import Axes
 
 from fracctl.errors import ConfigurationError
-from fracctl.figures import TYPES, FigureError, draw, gain_contours, objective_against_order, trajectories
+from fracctl.figures import (
+    FigureError,
+    draw,
+    gain_contours,
+    objective_against_order,
+    order_contours,
+    trajectories,
+)
 from fracctl.figures.results import Results, select
 from fracctl.figures.style import style
 from fracctl.store import RunDirectory
 from tests.figures.synthetic import HORIZON_PERIODS, THRESHOLD, write_run
 
-ALL = {name: {"type": name} for name in TYPES if name != "work_precision"}
+ALL = {name: {"type": name} for name in ("gain_contours", "trajectories", "objective_against_order")}
 
 
 @pytest.fixture(scope="module")
@@ -182,6 +189,42 @@ def test_objective_against_order_shows_every_slice(run: RunDirectory) -> None:
         np.testing.assert_array_equal(ax.lines[0].get_ydata(), rows["objective_st_os_u"])
         best = rows.loc[rows["objective_st_os_u"].idxmin()]
         assert line_xy(ax, "*") == [(best["slice"], best["objective_st_os_u"])]
+
+
+def bowl_over_orders(folder: Path) -> RunDirectory:
+    """A run with optima for slices of two orders: 2 at (0.93, 0.95), 2.74 at (1, 1), none at (0.9, 0.9)."""
+    write_run(folder)
+    u, v = (axis.ravel() for axis in np.meshgrid(np.linspace(0.9, 1.0, 11), np.linspace(0.9, 1.0, 11)))
+    value = 2.0 + 100.0 * ((u - 0.93) ** 2 + (v - 0.95) ** 2)
+    rows = {"initial_condition": "ic1", "alpha_u": u, "alpha_v": v, "settling_time": value, "status": "ok"}
+    slices = pd.DataFrame(
+        {"kind": "slice", "objective_name": "settling_time", **rows, "objective_settling_time": value}
+    )
+    slices = slices[(u > 0.9) | (v > 0.9)]
+    best, base = (
+        slices.loc[[slices["settling_time"].idxmin()]],
+        slices[(slices["alpha_u"] == 1.0) & (slices["alpha_v"] == 1.0)],
+    )
+    kinds = [best.assign(kind="overall"), base.assign(kind="baseline"), slices]
+    pd.concat(kinds, ignore_index=True).to_parquet(folder / "optima.parquet")
+    return RunDirectory(folder)
+
+
+def test_contours_over_orders_mark_the_best_and_the_baseline(tmp_path: Path) -> None:
+    results = Results(bowl_over_orders(tmp_path))
+    with style():
+        figure, table = order_contours.build(results, select(results, {}))
+    ax = figure.axes[0]
+    assert line_xy(ax, "*") == [(pytest.approx(0.93), pytest.approx(0.95))]
+    assert line_xy(ax, "D") == [(pytest.approx(1.0), pytest.approx(1.0))]
+    assert ax.get_title().startswith("IC1: 0.3183 at (0.93, 0.95), −27.0 %")
+    assert len(table) == 120
+    assert table.iloc[0][["alpha_u", "alpha_v"]].tolist() == pytest.approx([0.9, 0.91])
+
+
+def test_contours_over_orders_need_two_orders(run: RunDirectory) -> None:
+    with pytest.raises(FigureError, match="this run varies alpha_w"):
+        draw(run, {"orders": {"type": "order_contours"}})
 
 
 @pytest.mark.parametrize(
