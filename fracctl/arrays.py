@@ -71,6 +71,15 @@ def orders(name: str, value: ArrayLike, columns: int) -> Floats:
     return array
 
 
+def orders_up_to_one(name: str, value: ArrayLike) -> Floats:
+    """Return orders as a float array; raise ArgumentError unless all lie in (0, 1]."""
+    array = finite(name, value)
+    outside = array[(array <= 0.0) | (array > 1.0)]
+    if outside.size:
+        raise ArgumentError(name, float(outside.flat[0]), "must lie in (0, 1]")
+    return array
+
+
 def batch_size(**arrays: tuple[Array, int]) -> int | None:
     """Return the common batch size, None if no array is batched; each value is (array, unbatched ndim)."""
     sizes = {name: array.shape[0] for name, (array, ndim) in arrays.items() if array.ndim > ndim}

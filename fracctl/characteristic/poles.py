@@ -57,25 +57,23 @@ class _Term:
 
 
 def _companion_eigenvalues(matrix: CharacteristicMatrix) -> Complexes:
-    """Eigenvalues of the first-order form, for orders -1, 0, 1, 2 (order -1 adds an integral as a state)."""
-    p = matrix.size
+    """Eigenvalues of the first-order form, for orders -1, 0, 1, 2 (order -1 adds as many integrals as it has rank)."""
+    p, m = matrix.size, matrix.system.n_positions
     blocks = {order: np.zeros((p, p)) for order in (-1, 0, 1, 2)}
     for term in _squeezed(matrix):
         for k, order in enumerate(term.orders):
             if term.matrix[:, k].any():
                 blocks[int(order)][:, k] += term.matrix[:, k]
-    m = matrix.system.n_positions
-    integral = blocks[-1].any()
-    n = p + m + (p if integral else 0)
-    companion = np.zeros((n, n))
-    # state: y (p), rates of positions (m), integrals of y (p)
+    left, sizes, right = np.linalg.svd(blocks[-1])
+    rank = int(np.sum(sizes > 1e-13 * sizes[0]))
+    # state: y (p), rates of positions (m), integrals of combinations of y (rank)
+    companion = np.zeros((p + m + rank, p + m + rank))
     companion[:m, p : p + m] = np.eye(m)
     rows = np.r_[p : p + m, m:p]
     companion[rows, :p] = -blocks[0]
     companion[rows, p : p + m] = -blocks[1][:, :m]
-    if integral:
-        companion[p + m :, :p] = np.eye(p)
-        companion[rows, p + m :] = -blocks[-1]
+    companion[rows, p + m :] = -left[:, :rank] * sizes[:rank]
+    companion[p + m :, :p] = right[:rank]
     values = np.linalg.eigvals(companion).astype(np.complex128)
     return values[np.lexsort((-values.imag, np.abs(values.imag), -values.real))]
 

@@ -27,7 +27,14 @@ BUILT_IN: Mapping[str, Mapping[str, str]] = {
         "hcw_out_of_plane": "fracctl.plants:HCWOutOfPlane",
         "linear": "fracctl.plants:LinearPlant",
     },
-    "controllers": {"pd": "fracctl.controllers.pd:PD", "pd_alpha": "fracctl.controllers:PDAlpha"},
+    "controllers": {
+        "pd": "fracctl.controllers:PD",
+        "pd_alpha": "fracctl.controllers:PDAlpha",
+        "pd_lag": "fracctl.controllers:PDLag",
+        "pid": "fracctl.controllers:PID",
+        "pdd_alpha": "fracctl.controllers:PDDAlpha",
+        "pi_lambda_d_mu": "fracctl.controllers:PILambdaDMu",
+    },
     "solvers": {
         "contour": "fracctl.solvers:Contour",
         "volterra": "fracctl.solvers:Volterra",

@@ -4,5 +4,9 @@ from fracctl.controllers.linear import LinearLaw, LinearLawTerms
 from fracctl.controllers.parameters import Parameter
 from fracctl.controllers.pd import PD
 from fracctl.controllers.pd_alpha import PDAlpha
+from fracctl.controllers.pd_lag import PDLag
+from fracctl.controllers.pdd_alpha import PDDAlpha
+from fracctl.controllers.pi_lambda_d_mu import PILambdaDMu
+from fracctl.controllers.pid import PID
 
-__all__ = ["PD", "LinearLaw", "LinearLawTerms", "PDAlpha", "Parameter"]
+__all__ = ["PD", "PID", "LinearLaw", "LinearLawTerms", "PDAlpha", "PDDAlpha", "PDLag", "PILambdaDMu", "Parameter"]

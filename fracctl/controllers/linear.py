@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from fracctl.arrays import Floats
 from fracctl.fractional.terms import FractionalTerm
+from fracctl.plants.linear import LinearPlant
 
 
 @dataclass(frozen=True)
@@ -34,4 +35,13 @@ class LinearLaw(Protocol):
 
     def linear_terms(self, n_controls: int) -> LinearLawTerms:
         """Return the terms of the law for a plant with m = `n_controls` positions."""
+        ...
+
+
+@runtime_checkable
+class ModelBasedLaw(Protocol):
+    """A law whose gains follow from the plant."""
+
+    def for_plant(self, plant: LinearPlant) -> LinearLaw:
+        """Return the law with the gains for a plant."""
         ...

@@ -7,10 +7,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fracctl.arrays import Floats, finite, matrices, orders
+from fracctl.arrays import finite, matrices, orders, orders_up_to_one
+from fracctl.controllers.layout import component_vector, filled, gain_matrix, gain_parameters, order_parameters
 from fracctl.controllers.linear import LinearLawTerms
-from fracctl.controllers.parameters import Parameter, entry_names
-from fracctl.errors import ArgumentError
+from fracctl.controllers.parameters import Parameter
 from fracctl.fractional.terms import FractionalTerm
 
 
@@ -33,10 +33,7 @@ class PDAlpha:
     def __init__(self, k_p: ArrayLike, k_d: ArrayLike, alpha: ArrayLike = 1.0) -> None:
         self.k_p = finite("k_p", k_p)
         self.k_d = finite("k_d", k_d)
-        self.alpha = finite("alpha", alpha)
-        outside = self.alpha[(self.alpha <= 0.0) | (self.alpha > 1.0)]
-        if outside.size:
-            raise ArgumentError("alpha", float(outside.flat[0]), "must lie in (0, 1]")
+        self.alpha = orders_up_to_one("alpha", alpha)
 
     def linear_terms(self, n_controls: int) -> LinearLawTerms:
         """Return -K_P D⁰ - K_D D^α."""
@@ -48,25 +45,12 @@ class PDAlpha:
     @staticmethod
     def parameters(components: Sequence[str]) -> tuple[Parameter, ...]:
         """Return alpha_…, k_p_…, k_d_… for the given components, in the order of the tables' columns."""
-        alphas = [
-            Parameter(f"alpha_{c}", default=1.0, lower=0.0, upper=1.0, lower_allowed=False, kind="order")
-            for c in components
-        ]
-        gains = [Parameter(name) for p in ("k_p", "k_d") for row in entry_names(p, components) for name in row]
-        return tuple(alphas + gains)
+        gains = gain_parameters("k_p", components) + gain_parameters("k_d", components)
+        return tuple(order_parameters("alpha", components) + gains)
 
     @classmethod
     def from_parameters(cls, components: Sequence[str], values: Mapping[str, ArrayLike]) -> PDAlpha:
         """Build the law from numbers or arrays (b,) by parameter name; missing ones take their defaults."""
-        table = {p.name: finite(p.name, values.get(p.name, p.default)) for p in cls.parameters(components)}
-        alpha = np.stack(np.broadcast_arrays(*[table[f"alpha_{c}"] for c in components]), axis=-1)
-        if len(components) == 1:
-            c = components[0]
-            return cls(table[f"k_p_{c}"], table[f"k_d_{c}"], alpha[..., 0] if alpha.ndim > 1 else alpha)
-        return cls(_matrix(table, "k_p", components), _matrix(table, "k_d", components), alpha)
-
-
-def _matrix(table: Mapping[str, Floats], prefix: str, components: Sequence[str]) -> Floats:
-    names = entry_names(prefix, components)
-    flat = np.broadcast_arrays(*[table[name] for row in names for name in row])
-    return np.stack(flat, axis=-1).reshape(*flat[0].shape, len(components), len(components))
+        table = filled(cls.parameters(components), values)
+        k_p, k_d = gain_matrix(table, "k_p", components), gain_matrix(table, "k_d", components)
+        return cls(k_p, k_d, component_vector(table, "alpha", components))

@@ -12,7 +12,18 @@ _MEASURES = {
     "overshoot": ("Overshoot", r"\mathrm{OS}"),
     "control_effort": ("Control effort", "U"),
 }
-_PREFIXES = {"alpha": r"\alpha_{%s}", "k_p": "k_{P_{%s}}", "k_d": "k_{D_{%s}}", "control": r"\upsilon_{%s}"}
+_PREFIXES = {
+    "alpha": r"\alpha_{%s}",
+    "lambda": r"\lambda_{%s}",
+    "mu": r"\mu_{%s}",
+    "time_constant": "T_{f_{%s}}",
+    "k_p": "k_{P_{%s}}",
+    "k_i": "k_{I_{%s}}",
+    "k_d_alpha": r"k_{D^\alpha_{%s}}",
+    "k_d": "k_{D_{%s}}",
+    "control": r"\upsilon_{%s}",
+}
+"""The first that a column begins with counts."""
 
 _LENGTHS = ((1e3, "km"), (1.0, "m"), (1e-3, "mm"))
 _ACCELERATIONS = ((1.0, "m/s²"), (1e-3, "mm/s²"), (1e-6, "µm/s²"))
@@ -46,11 +57,25 @@ def initial_condition(name: str) -> str:
 
 def controller(row: Mapping[str, Any]) -> str:
     """The law of a row of optima, e.g. PD^α with α_w = 0.91; its gains too where there are but two."""
-    orders = [name for name in row if name.startswith("alpha_")]
-    gains = [name for name in row if name.startswith(("k_p_", "k_d_"))]
-    law = "PD" if all(row[name] == 1.0 for name in orders) else r"PD$^{\alpha}$"
+    orders = [name for name in row if name.startswith(("alpha_", "lambda_", "mu_", "time_constant_"))]
+    gains = [name for name in row if name.startswith("k_")]
     shown = orders + (gains if len(gains) <= 2 else [])
-    return f"{law}: " + ", ".join(f"${symbol(name)} = {row[name]:g}$" for name in shown)
+    return f"{_law(row)}: " + ", ".join(f"${symbol(name)} = {row[name]:g}$" for name in shown)
+
+
+def _law(row: Mapping[str, Any]) -> str:
+    """Name of the law that has the columns of a row."""
+
+    def has(prefix: str) -> bool:
+        return any(name.startswith(prefix) for name in row)
+
+    if has("lambda_"):
+        return r"PI$^{\lambda}$D$^{\mu}$"
+    if has("time_constant_"):
+        return "PID" if has("k_i_") else "PD with lag"
+    if has("k_d_alpha_"):
+        return r"PDD$^{\alpha}$"
+    return "PD" if all(row[name] == 1.0 for name in row if name.startswith("alpha_")) else r"PD$^{\alpha}$"
 
 
 def power_of_ten(largest: float) -> tuple[float, str]:

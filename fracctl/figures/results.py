@@ -156,7 +156,7 @@ def objective_scale(results: Results, selection: Selection) -> tuple[float, str]
 
 def same_point(first: Row, second: Row) -> bool:
     """Whether two rows are the same design point."""
-    names = [name for name in first if name.startswith(("alpha_", "k_p_", "k_d_"))]
+    names = [name for name in first if name.startswith(("alpha_", "lambda_", "mu_", "time_constant_", "k_"))]
     return all(first[name] == second[name] for name in names)
 
 

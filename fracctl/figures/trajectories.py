@@ -63,7 +63,7 @@ def _end(results: Results, curves: Sequence[Curve]) -> float:
 
 
 def _state(ax: Axes, curves: Sequence[Curve], component: str, results: Results, times: Floats) -> None:
-    symbol, peak = labels.symbol(component), _peak(curves, component)
+    symbol, peak = labels.symbol(component), _peak(curves, component) or results.threshold or 0.0
     factor, note = labels.power_of_ten(peak)
     ax.set_ylabel(f"position ${symbol}$" + note)
     _draw(ax, curves, component, results.threshold, times, factor)

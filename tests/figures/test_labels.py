@@ -18,6 +18,10 @@ from fracctl.figures import labels
         ("alpha_w", r"\alpha_{w}"),
         ("k_p_uv", "k_{P_{uv}}"),
         ("k_d_w", "k_{D_{w}}"),
+        ("k_d_alpha_uv", r"k_{D^\alpha_{uv}}"),
+        ("k_i_w", "k_{I_{w}}"),
+        ("lambda_u", r"\lambda_{u}"),
+        ("time_constant_w", "T_{f_{w}}"),
         ("w", "w"),
         ("w_dot", "w'"),
         ("control_u", r"\upsilon_{u}"),
@@ -47,6 +51,9 @@ def test_controllers_name_their_law_and_few_gains() -> None:
     fractional = {"alpha_w": 0.91, "k_p_w": 0.85, "k_d_w": 2.0}
     assert labels.controller(fractional) == (r"PD$^{\alpha}$: $\alpha_{w} = 0.91$, $k_{P_{w}} = 0.85$, $k_{D_{w}} = 2$")
     assert labels.controller(fractional | {"alpha_w": 1.0}).startswith("PD: ")
+    lag = {"time_constant_w": 0.3, "k_p_w": 0.5, "k_d_w": 2.0}
+    assert labels.controller(lag) == "PD with lag: $T_{f_{w}} = 0.3$, $k_{P_{w}} = 0.5$, $k_{D_{w}} = 2$"
+    assert labels.controller(lag | {"k_i_w": 0.1}) == "PID: $T_{f_{w}} = 0.3$"
     many = {"alpha_u": 1.0, "alpha_v": 1.0} | {
         f"k_{term}_{name}": 1.0 for term in "pd" for name in ("u", "uv", "vu", "v")
     }

@@ -8,10 +8,8 @@ from functools import cached_property
 
 import numpy as np
 import pytest
-import scipy.linalg
 
-from fracctl.controllers import PDAlpha
-from fracctl.controllers.linear import LinearLawTerms
+from fracctl.controllers import LinearLaw, LinearLawTerms, PDAlpha, PDLag, PILambdaDMu
 from fracctl.fractional.terms import FractionalTerm
 from fracctl.loop import ClosedLoop
 from fracctl.plants import HCWInPlane, HCWOutOfPlane, LinearPlant
@@ -21,7 +19,7 @@ from tests.references import loops, series
 from tests.references.laplace import Reference
 from tests.references.loops import Loop
 from tests.references.product import check_times, closed_loop
-from tests.systems.laws import PID, Lag
+from tests.systems.laws import OUT_OF_PLANE, FirstOrder, filtered_pid, pid
 
 HORIZON = 10.0
 TIMES = check_times(HORIZON)
@@ -56,15 +54,14 @@ class Damper:
         return LinearLawTerms((FractionalTerm(np.array([[-self.k]]), np.array([self.alpha])),))
 
 
-def companion_case(law: Lag | PID) -> Case:
+def companion_case(name: str, law: LinearLaw, form: FirstOrder) -> Case:
     start = np.array([1e-3, 2e-3])
-    matrix = law.companion()
 
     def exact(times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        states = np.array([scipy.linalg.expm(matrix * t) @ [*start, 0.0] for t in times])
-        return states[:, :1], (states @ (matrix[1] + [1.0, 0.0, 0.0]))[:, None]
+        states = form.states(start, times)
+        return states[:, :1], states @ form.output.T
 
-    return Case(type(law).__name__, ClosedLoop(HCWOutOfPlane(), law), start, exact, smooth=True)
+    return Case(name, ClosedLoop(HCWOutOfPlane(), law), start, exact, smooth=True)
 
 
 def integer_case(member: Loop) -> Case:
@@ -137,8 +134,8 @@ CASES = [
     viscous_oscillator(0.4),
     viscous_oscillator(1.5),
     rotated_oscillators(),
-    companion_case(Lag(k_p=0.5, k_d=2.0, time=0.3)),
-    companion_case(PID(k_p=1.0, k_d=2.0, k_i=0.7)),
+    companion_case("lag", PDLag(0.5, 2.0, 0.3), filtered_pid(*OUT_OF_PLANE, 0.5, 0.0, 2.0, 0.3)),
+    companion_case("PID", PILambdaDMu(1.0, 0.7, 2.0), pid(*OUT_OF_PLANE, 1.0, 0.7, 2.0)),
 ]
 SOLVERS: list[tuple[BatchSolver, float, float]] = [
     (Contour(), 1e-8, 1e-8),

@@ -1,48 +1,53 @@
-"""Laws that are data only: they exercise auxiliary states and integrals of the general linear form."""
+"""First-order forms of loops of integer order, written out from the equations of their laws."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.linalg
 
-from fracctl.controllers import LinearLawTerms
-from fracctl.fractional.terms import FractionalTerm
+from tests.references import loops
 
-
-@dataclass(frozen=True)
-class Lag:
-    """υ = -k_P w - k_D z, T z' = w' - z: PD with a lag in its derivative, one auxiliary state."""
-
-    k_p: float
-    k_d: float
-    time: float
-
-    def linear_terms(self, n_controls: int) -> LinearLawTerms:
-        control = (FractionalTerm(np.array([[-self.k_p, -self.k_d]]), np.zeros(2)),)
-        auxiliary = (
-            FractionalTerm(np.array([[1.0 / self.time, 0.0]]), np.array([1.0, 0.0])),
-            FractionalTerm(np.array([[0.0, -1.0 / self.time]]), np.zeros(2)),
-        )
-        return LinearLawTerms(control, auxiliary, np.zeros(1))
-
-    def companion(self) -> np.ndarray:
-        """Return the matrix of [w w' z]' for w'' = -w + υ."""
-        return np.array([[0, 1, 0], [-1 - self.k_p, 0, -self.k_d], [0, 1 / self.time, -1 / self.time]])
+OUT_OF_PLANE = np.array(loops.OUT_OF_PLANE_STIFFNESS), np.array(loops.OUT_OF_PLANE_DAMPING)
+IN_PLANE = np.array(loops.IN_PLANE_STIFFNESS), np.array(loops.IN_PLANE_DAMPING)
 
 
 @dataclass(frozen=True)
-class PID:
-    """υ = -k_P w - k_D w' - k_I ∫w: an order of -1."""
+class FirstOrder:
+    """x' = A x, υ = C x with x = [ξ, ξ', ∫ξ, z]; z of m entries, or of none."""
 
-    k_p: float
-    k_d: float
-    k_i: float
+    matrix: np.ndarray
+    output: np.ndarray
 
-    def linear_terms(self, n_controls: int) -> LinearLawTerms:
-        gains = ((self.k_p, 0.0), (self.k_d, 1.0), (self.k_i, -1.0))
-        return LinearLawTerms(tuple(FractionalTerm(np.array([[-gain]]), np.array([order])) for gain, order in gains))
+    def states(self, start: np.ndarray, times: np.ndarray) -> np.ndarray:
+        """Return x from [ξ(0), ξ'(0)], (t, n)."""
+        first = np.concatenate([start, np.zeros(len(self.matrix) - len(start))])
+        return np.array([scipy.linalg.expm(self.matrix * t) @ first for t in times])
 
-    def companion(self) -> np.ndarray:
-        """Return the matrix of [w w' ∫w]' for w'' = -w + υ."""
-        return np.array([[0, 1, 0], [-1 - self.k_p, -self.k_d, -self.k_i], [1, 0, 0]])
+
+def pid(stiffness: np.ndarray, damping: np.ndarray, k_p: object, k_i: object, k_d: object) -> FirstOrder:
+    """Return ξ'' = S ξ + D ξ' + υ with υ = -K_P ξ - K_I ∫ξ - K_D ξ'."""
+    m = len(stiffness)
+    k_p, k_i, k_d = (np.reshape(gain, (m, m)) for gain in (k_p, k_i, k_d))
+    one, no = np.eye(m), np.zeros((m, m))
+    output = np.hstack([-k_p, -k_d, -k_i])
+    rows = [np.hstack([no, one, no]), np.hstack([stiffness, damping, no]) + output, np.hstack([one, no, no])]
+    return FirstOrder(np.vstack(rows), output)
+
+
+def filtered_pid(
+    stiffness: np.ndarray, damping: np.ndarray, k_p: object, k_i: object, k_d: object, time_constant: object
+) -> FirstOrder:
+    """Return the same with υ = -K_P ξ - K_I ∫ξ - K_D z, T_f z' = ξ' - z."""
+    m = len(stiffness)
+    k_p, k_i, k_d = (np.reshape(gain, (m, m)) for gain in (k_p, k_i, k_d))
+    one, no, rate = np.eye(m), np.zeros((m, m)), np.diag(1.0 / np.broadcast_to(time_constant, m))
+    output = np.hstack([-k_p, no, -k_i, -k_d])
+    rows = [
+        np.hstack([no, one, no, no]),
+        np.hstack([stiffness, damping, no, no]) + output,
+        np.hstack([one, no, no, no]),
+        np.hstack([no, rate, no, -rate]),
+    ]
+    return FirstOrder(np.vstack(rows), output)

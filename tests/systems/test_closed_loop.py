@@ -5,14 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fracctl.controllers import PDAlpha
+from fracctl.controllers import PDAlpha, PDLag
 from fracctl.errors import ArgumentError
 from fracctl.fractional.system import LinearFractionalSystem
 from fracctl.fractional.terms import FractionalTerm, powers
 from fracctl.loop import ClosedLoop
 from fracctl.plants import HCWInPlane, HCWOutOfPlane, LinearPlant
 from tests.references import loops, poles
-from tests.systems.laws import Lag
 
 
 def matrix_at(system: LinearFractionalSystem, sigma: complex, member: int = 0) -> np.ndarray:
@@ -48,7 +47,7 @@ def test_out_of_plane_members_are_the_written_out_equations() -> None:
 
 def test_auxiliary_states_enter_the_equation() -> None:
     """det M of the lag is (σ² + 1 + k_P)(T σ + 1) + k_D σ, divided by T."""
-    loop = ClosedLoop(HCWOutOfPlane(), Lag(k_p=0.5, k_d=2.0, time=0.3))
+    loop = ClosedLoop(HCWOutOfPlane(), PDLag(k_p=0.5, k_d=2.0, time_constant=0.3))
     assert (loop.system.n_positions, loop.system.n_auxiliary, loop.system.size) == (1, 1, 2)
     for sigma in (0.4 + 0.9j, -2.0 + 0.1j):
         expected = ((sigma**2 + 1.5) * (0.3 * sigma + 1.0) + 2.0 * sigma) / 0.3
@@ -66,7 +65,7 @@ def test_initial_values_without_auxiliary_states() -> None:
 
 
 def test_initial_values_with_auxiliary_states() -> None:
-    loop = ClosedLoop(HCWOutOfPlane(), Lag(k_p=0.5, k_d=2.0, time=0.3))
+    loop = ClosedLoop(HCWOutOfPlane(), PDLag(k_p=0.5, k_d=2.0, time_constant=0.3))
     value, rate = loop.initial_values(np.array([1.0, 2.0]))
     np.testing.assert_array_equal(value, [1.0, 0.0])
     np.testing.assert_array_equal(rate, [2.0, 0.0])
