@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 
 from fracctl.arrays import Array, Floats
-from fracctl.controllers.linear import LinearLaw
+from fracctl.controllers.linear import LinearLaw, ModelBasedLaw
 from fracctl.controllers.parameters import Parameter
 from fracctl.errors import ArgumentError, UnsupportedError
 from fracctl.loop import ClosedLoop
@@ -31,7 +31,9 @@ class ParametrisedLaw(Protocol):
         ...
 
     @classmethod
-    def from_parameters(cls, components: Sequence[str], values: Mapping[str, Floats | float]) -> LinearLaw:
+    def from_parameters(
+        cls, components: Sequence[str], values: Mapping[str, Floats | float]
+    ) -> LinearLaw | ModelBasedLaw:
         """Build the law from numbers or arrays (b,) by parameter name."""
         ...
 

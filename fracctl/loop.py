@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from fracctl.arrays import Floats, batch_size
-from fracctl.controllers.linear import LinearLaw
+from fracctl.controllers.linear import LinearLaw, ModelBasedLaw
 from fracctl.errors import ArgumentError
 from fracctl.fractional.system import LinearFractionalSystem
 from fracctl.fractional.terms import FractionalTerm
@@ -28,7 +28,7 @@ class ClosedLoop:
     """
 
     plant: LinearPlant
-    controller: LinearLaw
+    controller: LinearLaw | ModelBasedLaw
 
     def __post_init__(self) -> None:
         self.system  # noqa: B018 - a wrong shape is refused here, where the user sees which loop it is
@@ -37,7 +37,8 @@ class ClosedLoop:
     def system(self) -> LinearFractionalSystem:
         """The loop as a linear fractional system."""
         m = self.plant.n_controls
-        law = self.controller.linear_terms(m)
+        given = self.controller
+        law = (given.for_plant(self.plant) if isinstance(given, ModelBasedLaw) else given).linear_terms(m)
         q = law.n_auxiliary
         identity = FractionalTerm(np.eye(m + q), np.array([2.0] * m + [1.0] * q))
         free = [

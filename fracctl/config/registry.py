@@ -34,6 +34,7 @@ BUILT_IN: Mapping[str, Mapping[str, str]] = {
         "pid": "fracctl.controllers:PID",
         "pdd_alpha": "fracctl.controllers:PDDAlpha",
         "pi_lambda_d_mu": "fracctl.controllers:PILambdaDMu",
+        "lqr": "fracctl.design:LQR",
     },
     "solvers": {
         "contour": "fracctl.solvers:Contour",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -13,16 +12,39 @@ from fracctl.surveys.base import SEARCHED_FOR, Rows
 
 KINDS = ("overall", "baseline", "slice")
 
-_Key = tuple[float, ...]
+Rank = tuple[float, ...]
+"""What is smaller for a better row: objective, control effort, design variables."""
 _Place = tuple[str, str, str, tuple[float, ...]]
 
 
-class Optima:
-    """Selects optima from rows that come part by part; holds the best rows only.
+def candidates(rows: Rows, objective: str, factors: Sequence[str]) -> Booleans:
+    """Return which rows may be an optimum of the objective that is the geometric mean of `factors`, (n,).
 
     A candidate has status ``ok``, is not known to be unstable, and has a finite objective. A combined objective needs
-    a control effort other than 0. The rows of a search count for the objective that was searched for. Ties go to the
-    smallest control effort, then to the lexicographically smallest design variables.
+    a control effort other than 0. The rows of a search count for the objective that was searched for.
+    """
+    unstable = np.equal(np.asarray(rows["stable"], dtype=object), False)
+    allowed: Booleans = (rows["status"] == "ok") & ~unstable & np.isfinite(rows[f"objective_{objective}"])
+    if len(factors) > 1 and "control_effort" in rows:
+        allowed &= rows["control_effort"] != 0.0
+    if SEARCHED_FOR in rows:
+        allowed &= np.isin(rows[SEARCHED_FOR], np.array([objective, None], dtype=object))
+    return allowed
+
+
+def ranks(rows: Rows, objective: str, factors: Sequence[str], design_variables: Sequence[str]) -> list[Rank]:
+    """Return the rank of every row; the objective is infinite in that of a row that is no candidate.
+
+    Ties go to the smallest control effort, then to the lexicographically smallest design variables.
+    """
+    values = np.where(candidates(rows, objective, factors), rows[f"objective_{objective}"], np.inf)
+    effort = np.asarray(rows.get("control_effort", np.zeros(len(values))))
+    columns = [values, np.where(np.isnan(effort), np.inf, effort), *(rows[name] for name in design_variables)]
+    return list(zip(*(column.tolist() for column in columns), strict=True))
+
+
+class Optima:
+    """Selects optima from rows that come part by part, by `candidates` and `ranks`; holds the best rows only.
 
     Args:
         objectives: measure columns by name of the objective; its values are the column ``objective_<name>``.
@@ -43,16 +65,17 @@ class Optima:
         self._slices = tuple(slices)
         self._baseline = dict(baseline or {})
         self._initial_conditions: list[str] = []
-        self._best: dict[_Place, tuple[_Key, dict[str, Any]]] = {}
+        self._best: dict[_Place, tuple[Rank, dict[str, Any]]] = {}
 
     def add(self, rows: Rows) -> None:
         """Take further rows into account."""
         names = rows["initial_condition"]
-        for name in dict.fromkeys(names.tolist()):
-            if name not in self._initial_conditions:
-                self._initial_conditions.append(name)
-            for objective in self._objectives:
-                self._add(rows, objective, name, self._candidates(rows, objective) & (names == name))
+        present = list(dict.fromkeys(names.tolist()))
+        self._initial_conditions += [name for name in present if name not in self._initial_conditions]
+        for objective, factors in self._objectives.items():
+            allowed = candidates(rows, objective, factors)
+            for name in present:
+                self._add(rows, objective, name, allowed & (names == name))
 
     def rows(self) -> list[dict[str, Any]]:
         """Return the optima: `kind`, `slice`, `objective_name`, then the columns of the rows.
@@ -72,15 +95,6 @@ class Optima:
         found = [(key[3], row) for key, (_, row) in self._best.items() if key[:3] == (objective, name, kind)]
         yield from sorted(found, key=lambda item: item[0])
 
-    def _candidates(self, rows: Rows, objective: str) -> Booleans:
-        unstable = np.equal(np.asarray(rows["stable"], dtype=object), False)
-        allowed: Booleans = (rows["status"] == "ok") & ~unstable & np.isfinite(rows[f"objective_{objective}"])
-        if len(self._objectives[objective]) > 1 and "control_effort" in rows:
-            allowed &= rows["control_effort"] != 0.0
-        if SEARCHED_FOR in rows:
-            allowed &= np.isin(rows[SEARCHED_FOR], np.array([objective, None], dtype=object))
-        return allowed
-
     def _add(self, rows: Rows, objective: str, name: str, allowed: Booleans) -> None:
         self._offer(rows, allowed, (objective, name, "overall", ()))
         if self._baseline:
@@ -97,14 +111,13 @@ class Optima:
         if not where.size:
             return
         values = rows[f"objective_{place[0]}"][where]
-        key, best = min((self._key(rows, place[0], row), row) for row in where[values == values.min()].tolist())
-        if place not in self._best or key < self._best[place][0]:
-            self._best[place] = (key, {column: _scalar(array[best]) for column, array in rows.items()})
-
-    def _key(self, rows: Rows, objective: str, row: int) -> _Key:
-        effort = float(rows["control_effort"][row]) if "control_effort" in rows else 0.0
-        design = (float(rows[column][row]) for column in self._design_variables)
-        return (float(rows[f"objective_{objective}"][row]), math.inf if math.isnan(effort) else effort, *design)
+        lowest = where[values == values.min()]
+        tied = {column: array[lowest] for column, array in rows.items()}
+        found = ranks(tied, place[0], self._objectives[place[0]], self._design_variables)
+        rank = min(found)
+        if place not in self._best or rank < self._best[place][0]:
+            best = found.index(rank)
+            self._best[place] = (rank, {column: _scalar(array[best]) for column, array in tied.items()})
 
 
 def _scalar(value: Any) -> Any:
