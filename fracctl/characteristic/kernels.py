@@ -1,4 +1,4 @@
-"""Compiled loops over members and nodes: determinants of 1×1 and 2×2 matrices, their winding, and solutions.
+"""Compiled loops over members and nodes: determinants of 1×1 and 2×2 matrices and their winding.
 
 An entry of M̃ is Σ_e c_e σ^e: coefficients (b, J) times a table of powers at the nodes of a path, (1, J, P) where
 members share the exponents, (b, J, P) otherwise. Real and imaginary parts are separate arrays, so that the inner
@@ -57,77 +57,6 @@ def _turns(re: Floats, im: Floats, order: Array) -> tuple[int, bool]:
 
 
 @compiled
-def _enclosed(re: Floats, im: Floats, layout: Array, order: Array) -> bool:
-    """Whether the phase does not turn along any of the paths, and each begins with a positive value."""
-    for w in range(len(layout)):
-        first = layout[w, 0]
-        stop = layout[w + 1, 0] if w + 1 < len(layout) else len(re)
-        turns, ambiguous = _turns(re, im, order[first:stop])
-        if turns != 0 or ambiguous or re[order[first]] <= 0.0:
-            return False
-    return True
-
-
-@compiled
-def _split(re: Floats, im: Floats, layout: Array, odd: Floats, even: Floats) -> None:
-    """Write the values at the odd and at the even nodes of each path, real parts first."""
-    at = 0
-    for w in range(len(layout)):
-        first, nodes = layout[w, 0], layout[w, 1]
-        start = at + 2 * w
-        for n in range(nodes):
-            odd[at + n] = re[first + n]
-            odd[at + nodes + n] = im[first + n]
-        for n in range(nodes + 1):
-            even[start + n] = re[first + nodes + n]
-            even[start + nodes + 1 + n] = im[first + nodes + n]
-        at += 2 * nodes
-
-
-@compiled
-def _invert(re: Floats, im: Floats) -> None:
-    """Replace values by their reciprocals."""
-    for n in range(len(re)):
-        scale = 1.0 / (re[n] * re[n] + im[n] * im[n])
-        re[n] *= scale
-        im[n] *= -scale
-
-
-@compiled
-def solve_scalar(entry: Any, source: Any, layout: Array, order: Array, odd: Floats, even: Floats) -> Booleans:
-    """Solve M̃ Z̃ = r for one coordinate at the interlaced nodes of several paths.
-
-    Args:
-        entry: coefficients (b, J), real and imaginary powers (1 or b, J, P).
-        source: the same for r, coefficients (k, b, Q).
-        layout: first node and N of each path, (W, 2); a path begins with its N odd and its N + 1 even nodes.
-        order: places of the nodes in the order along the paths, (P,).
-        odd: out, (1, k, b, Σ 2N), real parts then imaginary parts of each path.
-        even: out, (1, k, b, Σ (2N + 2)).
-
-    Returns:
-        Whether the phase of M̃ does not turn along any path, (b,).
-    """
-    c, re, im = entry
-    s, s_re, s_im = source
-    count, length = len(c), re.shape[2]
-    enclosed = np.empty(count, np.bool_)
-    d_re, d_im, r_re, r_im = np.empty(length), np.empty(length), np.empty(length), np.empty(length)
-    for i in range(count):
-        shared, own = min(i, re.shape[0] - 1), min(i, s_re.shape[0] - 1)
-        _sum(c[i], re[shared], im[shared], d_re, d_im)
-        enclosed[i] = _enclosed(d_re, d_im, layout, order)
-        _invert(d_re, d_im)
-        for k in range(len(s)):
-            _sum(s[k, i], s_re[own], s_im[own], r_re, r_im)
-            for n in range(length):
-                x, y = r_re[n] * d_re[n] - r_im[n] * d_im[n], r_re[n] * d_im[n] + r_im[n] * d_re[n]
-                r_re[n], r_im[n] = x, y
-            _split(r_re, r_im, layout, odd[0, k, i], even[0, k, i])
-    return enclosed
-
-
-@compiled
 def _determinant(entries: Any, i: int, m_re: Floats, m_im: Floats, d_re: Floats, d_im: Floats) -> None:
     """Fill in the four entries (4, P) and the determinant (P,) of member i."""
     for e in range(4):
@@ -139,47 +68,6 @@ def _determinant(entries: Any, i: int, m_re: Floats, m_im: Floats, d_re: Floats,
         d_re[n] -= m_re[1, n] * m_re[2, n] - m_im[1, n] * m_im[2, n]
         d_im[n] = m_re[0, n] * m_im[3, n] + m_im[0, n] * m_re[3, n]
         d_im[n] -= m_re[1, n] * m_im[2, n] + m_im[1, n] * m_re[2, n]
-
-
-@compiled
-def solve_pair(entries: Any, sources: Any, layout: Array, order: Array, odd: Floats, even: Floats) -> Booleans:
-    """Solve M̃ Z̃ = r for two coordinates; `entries` holds M̃₁₁, M̃₁₂, M̃₂₁, M̃₂₂ and `sources` r₁, r₂, as above."""
-    count, length = len(entries[0][0]), entries[0][1].shape[2]
-    enclosed = np.empty(count, np.bool_)
-    m_re, m_im = np.empty((4, length)), np.empty((4, length))
-    d_re, d_im = np.empty(length), np.empty(length)
-    r_re, r_im = np.empty((2, length)), np.empty((2, length))
-    z_re, z_im = np.empty(length), np.empty(length)
-    for i in range(count):
-        _determinant(entries, i, m_re, m_im, d_re, d_im)
-        enclosed[i] = _enclosed(d_re, d_im, layout, order)
-        _invert(d_re, d_im)
-        for k in range(len(sources[0][0])):
-            for row in range(2):
-                s, s_re, s_im = sources[row]
-                own = min(i, s_re.shape[0] - 1)
-                _sum(s[k, i], s_re[own], s_im[own], r_re[row], r_im[row])
-            for row in range(2):
-                plus, minus, other = 3 - 3 * row, 1 + row, 1 - row
-                for n in range(length):
-                    x = m_re[plus, n] * r_re[row, n] - m_im[plus, n] * r_im[row, n]
-                    x -= m_re[minus, n] * r_re[other, n] - m_im[minus, n] * r_im[other, n]
-                    y = m_re[plus, n] * r_im[row, n] + m_im[plus, n] * r_re[row, n]
-                    y -= m_re[minus, n] * r_im[other, n] + m_im[minus, n] * r_re[other, n]
-                    z_re[n] = x * d_re[n] - y * d_im[n]
-                    z_im[n] = x * d_im[n] + y * d_re[n]
-                _split(z_re, z_im, layout, odd[row, k, i], even[row, k, i])
-    return enclosed
-
-
-def solve(entries: Any, sources: Any, layout: Array, order: Array, odd: Floats, even: Floats) -> Booleans:
-    """Solve one or two coordinates; see `solve_scalar` and `solve_pair`."""
-    enclosed: Booleans
-    if len(sources) == 1:
-        enclosed = solve_scalar(entries[0], sources[0], layout, order, odd, even)
-    else:
-        enclosed = solve_pair(entries, sources, layout, order, odd, even)
-    return enclosed
 
 
 def follow(entries: Any, factor_re: Floats, factor_im: Floats) -> tuple[Array, Booleans, Floats]:

@@ -42,17 +42,27 @@ class PowerSeries:
 
         `order` is a number or (b,). Powers that the Caputo derivative takes to zero are left out.
         """
-        first = 2 if np.min(order) > 1.0 else 1 if np.min(order) > 0.0 else 0
-        values = self.coefficients[first:, component]
-        powers = self.exponents[first:] - order if self.exponents.ndim == 1 and np.ndim(order) == 0 else None
+        basis = differentiated(self.exponents, np.asarray(order, dtype=np.float64), times)
+        values = self.coefficients[:, component]
         each: Floats
-        if powers is not None:
-            each = np.tensordot(values, times ** powers[:, None] * rgamma(powers[:, None] + 1.0), axes=(0, 0))
-            return each
-        exponents = self.exponents if self.exponents.ndim == 2 else self.exponents[:, None]
-        own = (exponents[first:] - order)[..., None]
-        each = np.einsum("e...b,ebt->...bt", values, times**own * rgamma(own + 1.0))
+        if basis.ndim == 2:
+            each = np.tensordot(values, basis, axes=(0, 0))
+        else:
+            each = np.einsum("e...b,ebt->...bt", values, basis)
         return each
+
+
+def differentiated(exponents: Floats, order: Floats, times: Floats) -> Floats:
+    """Return D^order of t^e / Γ(e + 1) at times (t,), (E, t), or (E, b, t) if exponents are (E, b) or order is (b,).
+
+    The first two exponents are 0 and 1; the Caputo derivative of orders above them is zero.
+    """
+    own = exponents[:, None] if exponents.ndim == 1 and order.ndim else exponents
+    powers = (own - order)[..., None]
+    first = 2 if np.min(order) > 1.0 else 1 if np.min(order) > 0.0 else 0
+    basis = np.zeros((*powers.shape[:-1], len(times)))
+    basis[first:] = times ** powers[first:] * rgamma(powers[first:] + 1.0)
+    return basis
 
 
 def _killed(key: _Key, order: Floats) -> bool:
@@ -67,46 +77,66 @@ def short_time_series(system: LinearFractionalSystem, y0: Floats, y0_rate: Float
     Raises:
         UnsupportedError: an order lies so near the highest of its equation that the powers are too dense.
     """
-    symbols = _symbols(system)
-    present = [{i for i in range(system.size) if np.any(values[..., i])} for values in (y0, y0_rate)]
-    recipe = _cached_recipe(symbols, present, highest)
+    recipe, gains = recursion(system, y0, y0_rate, highest)
     lead = y0.shape[:-1]
-    entries = [entry for symbol in symbols for entry in symbol.entries.values()] or [np.zeros(())]
-    gains = np.stack([np.broadcast_to(entry, lead[-1:]) for entry in entries])
     coefficients = np.zeros((len(recipe.exponents), system.size, int(np.prod(lead[:-1])), lead[-1]))
     for start, values in enumerate((y0, y0_rate)):
         coefficients[start] = np.moveaxis(values, -1, 0).reshape(coefficients.shape[1:])
     _apply(recipe.steps, gains, coefficients)
     coefficients = coefficients.reshape(-1, system.size, *lead)
-    kept, omitted = recipe.split(highest)
-    remainder = np.zeros(lead)
-    for i in omitted:
-        remainder = np.maximum(remainder, np.abs(coefficients[i]).max(axis=0) * rgamma(recipe.smallest[i] + 1.0))
-    cut = min((recipe.smallest[i] for i in omitted), default=highest + 1.0)
-    return PowerSeries(recipe.exponents[kept], coefficients[kept], remainder, cut)
+    omitted = np.abs(coefficients[recipe.kept :]).max(axis=1, initial=0.0)
+    remainder = np.max(omitted * recipe.sizes.reshape(-1, *[1] * len(lead)), axis=0, initial=0.0)
+    return PowerSeries(recipe.exponents[: recipe.kept], coefficients[: recipe.kept], remainder, recipe.cut)
 
 
-@dataclass(frozen=True)
-class _Recipe:
-    """Which coefficient feeds which: rows (target, source, row, column, entry), and the exponents in order."""
+def recursion(system: LinearFractionalSystem, y0: Floats, y0_rate: Floats, highest: float) -> tuple[Recipe, Floats]:
+    """Return the recipe of the coefficients of `short_time_series`, and its gains (entries, b)."""
+    symbols = _symbols(system)
+    present = [{i for i in range(system.size) if np.any(values[..., i])} for values in (y0, y0_rate)]
+    entries = [entry for symbol in symbols for entry in symbol.entries.values()] or [np.zeros(())]
+    gains = np.stack([np.broadcast_to(entry, y0.shape[-2:-1]) for entry in entries])
+    return _cached_recipe(symbols, present, highest), gains
+
+
+@dataclass(frozen=True, eq=False)
+class Recipe:
+    """Which coefficient feeds which."""
 
     exponents: Floats
-    """(E,) or (E, b)."""
+    """(E,) or (E, b): 0 and 1 first, those beyond the highest last."""
+    kept: int
+    """Number of the others."""
     steps: Array
+    """(target, source, row, column, entry): the target in the row of y gets -gain times the source in the column."""
+    highest: float
 
     @cached_property
-    def smallest(self) -> list[float]:
-        """Each exponent, its least value over the members."""
-        least: list[float] = self.exponents.reshape(len(self.exponents), -1).min(axis=1).tolist()
+    def sizes(self) -> Floats:
+        """1 / Γ(e + 1) of the omitted powers."""
+        sizes: Floats = rgamma(self._omitted + 1.0)
+        return sizes
+
+    @cached_property
+    def cut(self) -> float:
+        """Smallest omitted exponent."""
+        return float(self._omitted.min()) if self._omitted.size else self.highest + 1.0
+
+    @property
+    def _omitted(self) -> Floats:
+        rest = self.exponents[self.kept :]
+        least: Floats = np.array([exponent.min() for exponent in rest])
         return least
 
-    def split(self, highest: float) -> tuple[list[int], list[int]]:
-        """Return which coefficients are kept and which lie beyond `highest`."""
-        kept = [i for i, e in enumerate(self.smallest) if e <= highest]
-        return kept, [i for i, e in enumerate(self.smallest) if e > highest]
+    @classmethod
+    def ordered(cls, exponents: Floats, steps: Array, highest: float) -> Recipe:
+        """Return the recipe with the exponents beyond the highest moved to the end."""
+        beyond = exponents.reshape(len(exponents), -1).min(axis=1) > highest
+        order = np.argsort(beyond, kind="stable")
+        steps[:, :2] = np.argsort(order)[steps[:, :2]]
+        return cls(exponents[order], int(np.sum(~beyond)), steps, highest)
 
 
-def _cached_recipe(symbols: list[_Symbol], present: list[set[int]], highest: float) -> _Recipe:
+def _cached_recipe(symbols: list[_Symbol], present: list[set[int]], highest: float) -> Recipe:
     if any(symbol.shift.ndim for symbol in symbols):
         return _recipe(symbols, present, highest)
     structure = tuple((float(s.shift), float(s.order), tuple(s.entries)) for s in symbols)
@@ -118,14 +148,14 @@ def _shared_recipe(
     structure: tuple[tuple[float, float, tuple[tuple[int, int], ...]], ...],
     present: tuple[frozenset[int], ...],
     highest: float,
-) -> _Recipe:
+) -> Recipe:
     """Return the recipe of members that share their orders."""
     blank = np.zeros(())
     symbols = [_Symbol(np.asarray(s), np.asarray(o), dict.fromkeys(places, blank)) for s, o, places in structure]
     return _recipe(symbols, [set(p) for p in present], highest)
 
 
-def _recipe(symbols: list[_Symbol], present: list[set[int]], highest: float) -> _Recipe:
+def _recipe(symbols: list[_Symbol], present: list[set[int]], highest: float) -> Recipe:
     """Follow the recursion level by level; coefficients beyond `highest` are fed but feed no others.
 
     `present` tells which components of y(0) and of y'(0) are not zero.
@@ -157,7 +187,7 @@ def _recipe(symbols: list[_Symbol], present: list[set[int]], highest: float) -> 
         level = following
         if not level:
             table = np.stack(np.broadcast_arrays(*exponents))
-            return _Recipe(table, np.array(steps, dtype=np.int64).reshape(-1, 5))
+            return Recipe.ordered(table, np.array(steps, dtype=np.int64).reshape(-1, 5), highest)
     raise UnsupportedError(
         "an order of the loop lies too near the highest order of its equation, so that the powers of its"
         " short-time solution are too dense; lower the order or drop the term"

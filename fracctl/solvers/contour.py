@@ -22,6 +22,7 @@ from fracctl.arrays import Array, Floats, share
 from fracctl.errors import ArgumentError, UnsupportedError
 from fracctl.solvers.base import Survey
 from fracctl.solvers.batched import BatchSolver
+from fracctl.solvers.contour_loops import loops
 from fracctl.solvers.contour_plan import make_plan
 from fracctl.solvers.contour_response import respond
 from fracctl.solvers.members import Members
@@ -87,13 +88,14 @@ class Contour(BatchSolver):
         """Solve `rows`; those that miss the tolerance again, the last time as they come out."""
         cost = np.zeros(len(radius), dtype=np.int64)
         single = members.system.size == 1
+        order = _SERIES_ORDER if single else _COUPLED_SERIES_ORDER
+        batch = loops(members.system, members.y0, members.rate, members.every, order)
         for attempt in _ATTEMPTS:
             missed: list[Array] = []
             for group in _classes(rows, radius, shift, attempt.ratio, max(_CHUNK // len(members.y0), 1)):
                 tolerance = max(attempt.safety * self.tolerance, _SMALLEST_TOLERANCE)
                 try:
                     hull = group.radius * (attempt.width if single else attempt.coupled)
-                    order = _SERIES_ORDER if single else _COUPLED_SERIES_ORDER
                     plan = make_plan(members.horizon, hull, group.radius, group.shift, tolerance, order)
                 except UnsupportedError:
                     if members.every:
@@ -101,12 +103,12 @@ class Contour(BatchSolver):
                     yield without_trajectory(members.take(group.rows), "failed")
                     continue
                 cost[group.rows] += plan.nodes
-                part = members.take(group.rows)
-                response, enclosed = respond(part.system, part.y0, part.rate, plan, part.every)
+                response, enclosed = respond(batch, group.rows, plan)
                 good = enclosed & (response.error.max(axis=0) <= self.tolerance)
                 done = good if attempt is not _ATTEMPTS[-1] else np.ones_like(good)
                 missed.append(group.rows[~done])
                 if done.any():
+                    part = members.take(group.rows)
                     yield packed(part, response, np.flatnonzero(done), good, cost[group.rows], plan.grid)
             rows = np.concatenate([np.zeros(0, dtype=np.intp), *missed])
             if not rows.size:

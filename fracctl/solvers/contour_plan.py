@@ -4,26 +4,25 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
 
 from fracctl.arrays import Array, Complexes, Floats
-from fracctl.fractional.terms import powers
 from fracctl.panels import Panel, PanelGrid
 from fracctl.solvers.contour_design import ContourShape, design
 from fracctl.solvers.sampling import FIRST_TIME, LOGARITHMIC_NODES, panel_nodes
 
 RATIOS = (3.0, 4.0, 5.0, 6.0, 7.0, 8.0)
 """Last over first time of a window; few values, so that few contours are designed."""
-_MOST_CACHED = 16
-"""Sets of orders whose kernels a plan keeps."""
+_CHECKED = 5
+"""Times of a window at which the two rules are compared."""
 _LONGEST = 36.0
 """Half-length of a panel times the largest frequency, beyond which a window is split."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Window:
     """One contour and the grid nodes it serves.
 
@@ -44,20 +43,38 @@ class Window:
     checked: Array
     """Which of these times compare the two rules."""
 
+    last: Floats
+    """From values at these times to the last three Chebyshev coefficients of each panel, (3 panels, t)."""
+
+    @property
+    def rows(self) -> int:
+        """Number of values and last coefficients."""
+        return len(self.times) + len(self.last)
+
+    @cached_property
+    def _exponentials(self) -> Complexes:
+        """e^{σt} at the first 2N + 1 nodes, (t, 2N + 1)."""
+        return np.exp(self.times[:, None] * self.path[: 2 * self.nodes + 1])
+
     def kernels(self, exponents: tuple[float, ...]) -> tuple[Floats, Floats]:
-        """Return real matrices (2N, E t) and (2N + 2, E c) that take Z(σ), real parts first, to (σ^e Z)(t)."""
-        last = 2 * self.nodes + 1
-        powers = [np.exp(e * np.log(self.path[:last])) * self.weights for e in exponents]
-        middle = [self._matrix(slice(1, last, 2), p, self.times) for p in powers]
-        ends = [self._matrix(slice(0, last, 2), p, self.times[self.checked]) for p in powers]
-        return np.ascontiguousarray(np.hstack(middle)), np.ascontiguousarray(np.hstack(ends))
+        """Return real matrices that take Z(σ), real parts first, to (σ^e Z)(t) for each exponent.
 
-    def _matrix(self, which: slice, powers: Complexes, times: Floats) -> Floats:
-        kernel = powers[which, None] * np.exp(self.path[which, None] * times)
-        return np.concatenate([kernel.imag, kernel.real])
+        From the odd nodes to rows, values followed by last coefficients, (E rows, 2N), and from the even nodes to
+        values at the checked times, (E c, 2N + 2).
+        """
+        stop = 2 * self.nodes + 1
+        factors = [np.exp(e * np.log(self.path[:stop])) * self.weights for e in exponents]
+        main = [_real(self._exponentials[:, 1::2] * factor[1::2]) for factor in factors]
+        other = [_real(self._exponentials[self.checked, ::2] * factor[::2]) for factor in factors]
+        return np.concatenate([part for values in main for part in (values, self.last @ values)]), np.concatenate(other)
 
 
-@dataclass(frozen=True)
+def _real(kernel: Complexes) -> Floats:
+    """Return the real matrix whose product with real and imaginary parts is the imaginary part of that of `kernel`."""
+    return np.concatenate([kernel.imag, kernel.real], axis=1)
+
+
+@dataclass(frozen=True, eq=False)
 class Plan:
     """Grid and windows for a horizon and a hull of poles."""
 
@@ -65,8 +82,6 @@ class Plan:
     windows: tuple[Window, ...]
     series_order: float
     """Highest exponent of the power series that fills the first panel."""
-    _kernels: dict[tuple[float, ...], list[tuple[Floats, Floats]]] = field(default_factory=dict)
-    _tables: dict[tuple[float, ...], tuple[Floats, Floats]] = field(default_factory=dict)
 
     @property
     def nodes(self) -> int:
@@ -75,50 +90,8 @@ class Plan:
 
     @cached_property
     def path(self) -> Complexes:
-        """The paths of all windows, one after the other: of each the odd nodes, the even ones, and the rest."""
-        parts = [
-            (w.path[1 : 2 * w.nodes : 2], w.path[: 2 * w.nodes + 1 : 2], w.path[2 * w.nodes + 1 :])
-            for w in self.windows
-        ]
-        return np.concatenate([part for window in parts for part in window])
-
-    @cached_property
-    def order(self) -> Array:
-        """Places in `path` in the order along each contour, (P,)."""
-        order = np.arange(len(self.path))
-        for first, n in self.layout:
-            order[first : first + 2 * n + 1 : 2] = first + n + np.arange(n + 1)
-            order[first + 1 : first + 2 * n : 2] = first + np.arange(n)
-        return order
-
-    @cached_property
-    def layout(self) -> Array:
-        """First node in `path` and number N of midpoint nodes of each window, (windows, 2)."""
-        first = np.cumsum([0, *(len(window.path) for window in self.windows)])[:-1]
-        return np.stack([first, [window.nodes for window in self.windows]], axis=1)
-
-    def kernels(self, exponents: tuple[float, ...]) -> list[tuple[Floats, Floats]]:
-        """Return the kernels of each window for some exponents, from a cache."""
-        if exponents not in self._kernels:
-            if len(self._kernels) >= _MOST_CACHED:
-                self._kernels.clear()
-            self._kernels[exponents] = [window.kernels(exponents) for window in self.windows]
-        return self._kernels[exponents]
-
-    def table(self, exponents: Floats) -> tuple[Floats, Floats]:
-        """Return real and imaginary parts of σ^e along the path, (1, J, P) for (J,) and (b, J, P) for (b, J)."""
-        if exponents.ndim == 2:
-            return _parts(powers(self.path, exponents))
-        key = tuple(exponents.tolist())
-        if key not in self._tables:
-            if len(self._tables) >= _MOST_CACHED:
-                self._tables.clear()
-            self._tables[key] = _parts(powers(self.path, exponents)[None])
-        return self._tables[key]
-
-
-def _parts(values: Complexes) -> tuple[Floats, Floats]:
-    return np.ascontiguousarray(values.real), np.ascontiguousarray(values.imag)
+        """The paths of all windows, one after the other."""
+        return np.concatenate([window.path for window in self.windows])
 
 
 @lru_cache(maxsize=64)
@@ -146,7 +119,7 @@ def make_plan(horizon: float, hull: float, radius: float, shift: float, toleranc
         where = slice(int(grid.offsets[first]), int(grid.offsets[first + len(group)]))
         first += len(group)
         shape = design(tolerance, ratio, _rounded_up(hull * group[-1].end))
-        windows.append(_window(shape, where, grid.times[where], radius, shift))
+        windows.append(_window(shape, where, grid, radius, shift))
     return Plan(grid, tuple(windows), float(series_order))
 
 
@@ -173,9 +146,10 @@ def _panels(start: float, end: float, hull: float, tolerance: float) -> list[Pan
     ]
 
 
-def _window(shape: ContourShape, where: slice, times: Floats, radius: float, shift: float) -> Window:
+def _window(shape: ContourShape, where: slice, grid: PanelGrid, radius: float, shift: float) -> Window:
     last = 2 * shape.nodes + 1
     half = 0.5 * shape.step
+    times = grid.times[where]
     end = float(times[-1])
     theta = half * np.arange(last)
     far = np.arccosh(1.0 + (shape.vertex + 2.5 * (radius + shift) * end) / shape.bend)
@@ -183,5 +157,14 @@ def _window(shape: ContourShape, where: slice, times: Floats, radius: float, shi
     sigma, slope = shape.at(np.concatenate([theta, beyond]))
     weights = (shape.step / np.pi) * slope[:last] / end
     weights[0] *= 0.5
-    checked = np.unique(np.linspace(0, len(times) - 1, 5).astype(int))
-    return Window(shift + sigma / end, weights, shape.nodes, where, times, checked)
+    checked = np.linspace(0, len(times) - 1, _CHECKED).astype(int)
+    return Window(shift + sigma / end, weights, shape.nodes, where, times, checked, last_coefficients(grid, where))
+
+
+def last_coefficients(grid: PanelGrid, where: slice) -> Floats:
+    """Return the matrix from values on some panels to the last three Chebyshev coefficients of each, (3 panels, t)."""
+    mine = [(a, b) for a, b in itertools.pairwise(grid.offsets) if where.start <= a < where.stop]
+    matrix = np.zeros((3 * len(mine), where.stop - where.start))
+    for i, (a, b) in enumerate(mine):
+        matrix[3 * i : 3 * i + 3, a - where.start : b - where.start] = grid.last[:, a:b]
+    return matrix

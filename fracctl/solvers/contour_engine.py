@@ -1,0 +1,307 @@
+"""The compiled engine of the contour solver: responses of blocks of members on the grid of a plan.
+
+Block by block the power series fills the first panel and, window by window, the transforms are filled, multiplied by
+the kernels and combined to controls; all that a block needs in between stays in the cache. On a panel or window a
+derivative has rows: its values at the grid nodes, the last Chebyshev coefficients of the panels, and, on the first
+panel, its value at 0+.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from fracctl.arrays import Array, Booleans, Floats
+from fracctl.solvers.contour_fill import Matrix, fill
+from fracctl.solvers.contour_lanes import LANES, compiled, larger
+from fracctl.solvers.contour_rows import (
+    add_shapes,
+    combine,
+    enlarge,
+    enlarge_by_gaps,
+    product,
+    times_powers,
+    transpose,
+)
+
+
+class Start(NamedTuple):
+    """The power series on the first panel."""
+
+    nodes: int
+    """Grid nodes of the panel."""
+    steps: Array
+    """Steps of the recursion, see `fracctl.fractional.series.Recipe`."""
+    omitted: Floats
+    """1 / Γ(e + 1) of the omitted powers, which are the last ones."""
+    matrix: Floats
+    """From coefficients of the other powers to rows of each derivative, (1, w, r, E), or (blocks, w, r, E, LANES)."""
+
+
+class Windows(NamedTuple):
+    """What is computed on each window, whoever the members are."""
+
+    numbers: Array
+    """Of each window: first node and end of its nodes on the path, N, first grid node, number of grid nodes, and of
+    rows; (windows, 6)."""
+    checked: Array
+    """Which grid nodes of a window compare the two rules, (windows, c)."""
+    kernels: Floats
+    """Real matrices that take Z̃ to rows, and to values at the checked times by the other rule; one after the other."""
+    places: Array
+    """Where they begin, (requests, windows, 2)."""
+    shapes: Floats
+    """What an initial value adds to the rows of all windows, (1, w, rows), or (blocks, w, rows, LANES)."""
+
+
+class Wanted(NamedTuple):
+    """Derivatives."""
+
+    components: Array
+    """Coordinate of each, (w,)."""
+    requests: Array
+    """Derivatives that share a transform: coordinate, first, number, and the column of the table with a power of the
+    members' own to be multiplied by, or -1; (requests, 4)."""
+    stored: Array
+    """Which of them are stored, positions first."""
+    used: Array
+    """Which of them controls are made of."""
+
+
+class Members(NamedTuple):
+    """What tells members apart, in blocks of members."""
+
+    table: Floats
+    """Powers along the path, (1, P, C, 2), or (blocks, P, C, 2, LANES)."""
+    entries: Floats
+    """Coefficients of M̃, (blocks, t LANES)."""
+    sources: Floats
+    """Coefficients of r, (blocks, k, t' LANES)."""
+    feeds: Floats
+    """Gains of the recursion, (blocks, entries, LANES)."""
+    initial: Floats
+    """y(0) and y'(0), (blocks, 2, p, k LANES)."""
+    growth: Floats
+    """Remainder of each derivative over that of the series, (blocks, w, LANES)."""
+    added: Floats
+    """Coefficients of `shapes`, (blocks, w, k, LANES)."""
+    gains: Floats
+    """υ_i = Σ_w gains[i, w] values[w], (blocks, m, w, LANES)."""
+
+
+class Outputs(NamedTuple):
+    """What comes out, b members from k starts each."""
+
+    positions: Floats
+    """(k, b, m, T)."""
+    others: Floats
+    """Other derivatives that are stored, (k, b, o, T)."""
+    controls: Floats
+    """(k, b, m, T)."""
+    initial_controls: Floats
+    """υ(0+), (k, b, m)."""
+    peaks: Floats
+    """Largest positions and controls at the grid nodes, (k, b, 2)."""
+    errors: Floats
+    """Largest last Chebyshev coefficients, differences of rules and remainders of both, (k, b, 2)."""
+    enclosed: Booleans
+    """Whether all contours have all poles on their left, (b,)."""
+
+
+class _Place(NamedTuple):
+    """Of a block among the members."""
+
+    first: int
+    live: int
+
+
+class _Sizes(NamedTuple):
+    """Running results of a block."""
+
+    peaks: Floats
+    """Of positions and controls, (2, k LANES)."""
+    tails: Floats
+    """Largest last coefficients of both, (2, k LANES)."""
+    differences: Floats
+    """Largest difference of each derivative, (w, k LANES)."""
+
+
+@compiled
+def respond_blocks(
+    matrix: Matrix, start: Start, windows: Windows, wanted: Wanted, members: Members, outputs: Outputs
+) -> None:
+    """Fill in the outputs."""
+    starts, size = len(outputs.controls), len(matrix.coordinates)
+    width, count = starts * LANES, len(wanted.components)
+    most, nodes = max(windows.numbers[:, 5].max(), start.matrix.shape[2]), windows.numbers[:, 2].max()
+    odd, even = np.empty(size * 2 * nodes * width), np.empty(size * 2 * (nodes + 1) * width)
+    values, scratch = np.empty(count * most * width), np.empty((max(most, 2 * nodes + 2), width))
+    sizes = _Sizes(np.empty((2, width)), np.empty((2, width)), np.empty((count, width)))
+    for block in range(len(members.entries)):
+        for part in sizes:
+            part[:] = 0.0
+        enclosed, place = (
+            np.ones(LANES, np.bool_),
+            _Place(block * LANES, min(LANES, len(outputs.enclosed) - block * LANES)),
+        )
+        table, shapes = _own(members.table, block), _own(windows.shapes, block)
+        gains, rows, done = members.gains[block], start.matrix.shape[2], 0
+        derivatives = values[: count * rows * width].reshape(count, rows, width)
+        _begin(start, members, block, wanted, derivatives, sizes.differences)
+        _finish(derivatives, start.nodes, start.nodes + 3, 0, wanted, gains, place, scratch, sizes, outputs)
+        for number in range(len(windows.numbers)):
+            first, stop, n, grid, times, rows = windows.numbers[number]
+            derivatives = values[: count * rows * width].reshape(count, rows, width)
+            halves = (
+                odd[: size * 2 * n * width].reshape(size, 2 * n, width),
+                even[: size * 2 * (n + 1) * width].reshape(size, 2 * (n + 1), width),
+            )
+            path = table[first:stop]
+            fill(matrix, path, n, members.entries[block], members.sources[block], halves[0], halves[1], enclosed)
+            _multiply(windows, number, wanted, path, halves, derivatives, scratch, sizes.differences)
+            for w in range(count):
+                add_shapes(derivatives[w], shapes[w, done : done + rows], members.added[block, w])
+            _finish(derivatives, times, rows, grid, wanted, gains, place, scratch, sizes, outputs)
+            done += rows
+        outputs.enclosed[place.first : place.first + place.live] = enclosed[: place.live]
+        _conclude(wanted, gains, place, sizes, outputs)
+
+
+@compiled
+def _own(parts: Floats, block: int) -> Floats:
+    """Return what belongs to a block: its own, or the only one there is."""
+    own: Floats = parts[min(block, len(parts) - 1)]
+    return own
+
+
+@compiled
+def _begin(start: Start, members: Members, block: int, wanted: Wanted, values: Floats, differences: Floats) -> None:
+    """Fill in rows of all derivatives on the first panel, (w, r, k LANES), and their remainders (w, k LANES)."""
+    initial, feeds = members.initial[block], members.feeds[block]
+    matrix = _own(start.matrix, block)
+    kept, width = matrix.shape[2], initial.shape[2]
+    coefficients = np.zeros((initial.shape[1], kept + len(start.omitted), width))
+    coefficients[:, 0], coefficients[:, 1] = initial[0], initial[1]
+    for step in range(len(start.steps)):
+        target, source, row, column, entry = start.steps[step]
+        gain = feeds[entry]
+        for at in range(0, width, LANES):
+            to, by = coefficients[row, target, at : at + LANES], coefficients[column, source, at : at + LANES]
+            for n in range(LANES):
+                to[n] -= gain[n] * by[n]
+    remainder = np.zeros(width)
+    for i in range(len(coefficients)):
+        for e in range(len(start.omitted)):
+            row = coefficients[i, kept + e]
+            for n in range(width):
+                remainder[n] = larger(remainder[n], start.omitted[e] * abs(row[n]))
+    for w in range(len(values)):
+        product(matrix[w], coefficients[wanted.components[w], :kept], values[w])
+        growth = members.growth[block, w]
+        for n in range(width):
+            differences[w, n] = remainder[n] * growth[n % LANES]
+
+
+@compiled
+def _multiply(
+    windows: Windows,
+    number: int,
+    wanted: Wanted,
+    path: Floats,
+    halves: tuple[Floats, Floats],
+    values: Floats,
+    scratch: Floats,
+    differences: Floats,
+) -> None:
+    """Take transforms at odd nodes to rows of derivatives, (w, r, k LANES), and compare with even nodes."""
+    odd, even = halves
+    checked = windows.checked[number]
+    _, rows, width = values.shape
+    flat = values.reshape(-1, width)
+    for request in range(len(wanted.requests)):
+        component, first, count, column = wanted.requests[request]
+        main, other = odd[component], even[component]
+        if column >= 0:
+            times_powers(main, path, 1, column, scratch[: len(main)])
+            main = scratch[: len(main)]
+        at = windows.places[request, number, 0]
+        kernel = windows.kernels[at : at + count * rows * len(main)].reshape(count * rows, len(main))
+        np.dot(kernel, main, flat[first * rows : (first + count) * rows])
+        if column >= 0:
+            times_powers(other, path, 0, column, scratch[: len(other)])
+            other = scratch[: len(other)]
+        at = windows.places[request, number, 1]
+        kernel = windows.kernels[at : at + count * len(checked) * len(other)].reshape(-1, len(other))
+        for w in range(count):
+            few = kernel[w * len(checked) : (w + 1) * len(checked)]
+            compared = np.dot(few, other)
+            enlarge_by_gaps(differences[first + w], values[first + w], checked, compared)
+
+
+@compiled
+def _finish(
+    values: Floats,
+    nodes: int,
+    tails: int,
+    grid: int,
+    wanted: Wanted,
+    gains: Floats,
+    place: _Place,
+    scratch: Floats,
+    sizes: _Sizes,
+    outputs: Outputs,
+) -> None:
+    """Store positions, others and controls on one panel or window, and take their sizes.
+
+    Args:
+        values: rows of each derivative, (w, r, k LANES).
+        nodes: number of rows that are values at grid nodes,
+        tails: and end of those that are last coefficients.
+        grid: the first of these nodes.
+        wanted: which derivatives are stored or make controls.
+        gains: (m, w, LANES).
+        place: of the block among the members.
+        scratch: for one control.
+        sizes: running results.
+        outputs: of all members.
+    """
+    m = len(gains)
+    for i in range(len(wanted.stored)):
+        rows = values[wanted.stored[i]]
+        if i < m:
+            enlarge(sizes.peaks[0], rows[:nodes])
+            enlarge(sizes.tails[0], rows[nodes:tails])
+            transpose(rows[:nodes], grid, place.first, place.live, outputs.positions, i)
+        else:
+            transpose(rows[:nodes], grid, place.first, place.live, outputs.others, i - m)
+    for i in range(m):
+        control = scratch[: values.shape[1]]
+        combine(values, wanted.used, gains[i], control)
+        enlarge(sizes.peaks[1], control[:nodes])
+        enlarge(sizes.tails[1], control[nodes:tails])
+        transpose(control[:nodes], grid, place.first, place.live, outputs.controls, i)
+        for extra in range(tails, len(control)):
+            for k in range(len(outputs.controls)):
+                for n in range(place.live):
+                    outputs.initial_controls[k, place.first + n, i] = control[extra, k * LANES + n]
+
+
+@compiled
+def _conclude(wanted: Wanted, gains: Floats, place: _Place, sizes: _Sizes, outputs: Outputs) -> None:
+    """Write peaks and errors of a block."""
+    m, size = len(gains), len(sizes.differences)
+    for at in range(0, sizes.peaks.shape[1], LANES):
+        k = at // LANES
+        for n in range(place.live):
+            member = place.first + n
+            position, control = sizes.tails[0, at + n], sizes.tails[1, at + n]
+            for i in range(m):
+                position = larger(position, sizes.differences[wanted.stored[i], at + n])
+                total = 0.0
+                for w in range(size):
+                    total += abs(gains[i, w, n]) * sizes.differences[w, at + n]
+                control = larger(control, total)
+            outputs.errors[k, member, 0], outputs.errors[k, member, 1] = position, control
+            for i in range(2):
+                outputs.peaks[k, member, i] = sizes.peaks[i, at + n]

@@ -1,0 +1,30 @@
+"""Members side by side: the layout that the compiled loops of the contour solver work in.
+
+Members come in blocks of `LANES`, with the members of a block as the last axis of every array. All inner loops run
+over them: their length is known at compile time, so that they become vector instructions without remainder, and
+the workspace of one block stays in the cache.
+"""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+from fracctl.arrays import Array, Floats
+
+LANES = 64
+"""Members of a block."""
+
+compiled = numba.njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz", "arcp"})
+
+
+def lanes(values: Floats, members: Array) -> Floats:
+    """Return some of the members of values (…, b) as blocks (blocks, …, LANES), the last member filling up."""
+    padded = np.minimum(np.arange(-(-len(members) // LANES) * LANES), len(members) - 1).reshape(-1, LANES)
+    return np.ascontiguousarray(np.moveaxis(values[..., members[padded]], -2, 0))
+
+
+@compiled
+def larger(a: float, b: float) -> float:
+    """Return the larger of two numbers; NaN if one is."""
+    return a if b <= a or a != a else b

@@ -1,0 +1,104 @@
+"""What a plan gives the contour engine for loops of certain orders: powers, kernels, and functions of time.
+
+Members that share their orders share all of it, and it is kept for the next batch.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from scipy.special import rgamma
+
+from fracctl.arrays import Array, Floats
+from fracctl.fractional.series import Recipe, differentiated
+from fracctl.fractional.terms import powers
+from fracctl.solvers.contour_engine import Start, Windows
+from fracctl.solvers.contour_lanes import lanes
+from fracctl.solvers.contour_loops import Loops
+from fracctl.solvers.contour_plan import Plan, last_coefficients
+
+
+def tables(plan: Plan, loops: Loops, members: Array) -> tuple[Floats, Start, Windows]:
+    """Return the powers along the path, see `Members.table`, the series and the windows for some of the loops."""
+    if loops.shared:
+        exponents = tuple(float(order) for order in loops.exponents)
+        orders = tuple(float(wanted.order) for wanted in loops.derivatives)
+        added = tuple(float(power) for power in loops.powers)
+        return (
+            _shared_powers(plan, exponents),
+            _shared_start(plan, loops.recipe, orders),
+            _shared_windows(plan, loops.kernels, added),
+        )
+
+    def own(orders: list[Floats]) -> Floats:
+        return np.stack([order[members] if order.ndim else np.full(len(members), order) for order in orders])
+
+    recipe, everyone = loops.recipe, np.arange(len(members))
+    kept = list(recipe.exponents[: recipe.kept])
+    matrix = _start_matrix(plan, own(kept), own([wanted.order for wanted in loops.derivatives]))
+    shapes = lanes(_shapes(plan, own(loops.powers)), everyone)
+    return (
+        lanes(_powers(plan, own(loops.exponents)), everyone),
+        _start(plan, recipe, lanes(matrix, everyone)),
+        _shared_windows(plan, loops.kernels, ())._replace(shapes=shapes),
+    )
+
+
+@lru_cache(maxsize=64)
+def _shared_powers(plan: Plan, exponents: tuple[float, ...]) -> Floats:
+    return np.ascontiguousarray(_powers(plan, np.array(exponents))[None])
+
+
+@lru_cache(maxsize=64)
+def _shared_start(plan: Plan, recipe: Recipe, orders: tuple[float, ...]) -> Start:
+    return _start(plan, recipe, _start_matrix(plan, recipe.exponents[: recipe.kept], np.array(orders))[None])
+
+
+@lru_cache(maxsize=64)
+def _shared_windows(plan: Plan, exponents: tuple[tuple[float, ...], ...], added: tuple[float, ...]) -> Windows:
+    """Return the windows for kernels of some exponents a request, and the shapes t^p / Γ(p + 1)."""
+    first = np.cumsum([0, *(len(window.path) for window in plan.windows)])
+    numbers = [
+        (first[i], first[i + 1], window.nodes, window.where.start, len(window.times), window.rows)
+        for i, window in enumerate(plan.windows)
+    ]
+    kernels = [kernel for request in exponents for window in plan.windows for kernel in window.kernels(request)]
+    places = np.cumsum([0, *(kernel.size for kernel in kernels)])[:-1].reshape(len(exponents), -1, 2)
+    flat = np.concatenate([kernel.ravel() for kernel in kernels])
+    checked = np.stack([window.checked for window in plan.windows])
+    return Windows(np.array(numbers), checked, flat, places, np.ascontiguousarray(_shapes(plan, np.array(added))[None]))
+
+
+def _powers(plan: Plan, exponents: Floats) -> Floats:
+    """Return powers along the path for exponents (C,) or (C, b), (P, C, 2) or (P, C, 2, b)."""
+    values = powers(plan.path, exponents)
+    return np.moveaxis(np.stack([values.real, values.imag], axis=1), -1, 0)
+
+
+def _shapes(plan: Plan, exponents: Floats) -> Floats:
+    """Return rows of t^p / Γ(p + 1) on all windows for exponents (w,) or (w, b), (w, rows) or (w, rows, b)."""
+    parts: list[Floats] = []
+    for window in plan.windows:
+        values = window.times.reshape(-1, *[1] * exponents.ndim) ** exponents * rgamma(exponents + 1.0)
+        parts += [values, np.tensordot(window.last, values, axes=1)]
+    return np.moveaxis(np.concatenate(parts), 0, 1)
+
+
+def _start(plan: Plan, recipe: Recipe, matrix: Floats) -> Start:
+    return Start(plan.grid.panels[0].nodes, recipe.steps, recipe.sizes, np.ascontiguousarray(matrix))
+
+
+def _start_matrix(plan: Plan, exponents: Floats, orders: Floats) -> Floats:
+    """Return the matrix from powers (E,) or (E, b) to rows of derivatives (w,) or (w, b) on the first panel.
+
+    It is (w, rows, E) or (w, rows, E, b); the last row is the value at 0+.
+    """
+    nodes = plan.grid.panels[0].nodes
+    last, times = last_coefficients(plan.grid, slice(0, nodes)), np.append(plan.grid.times[:nodes], 0.0)
+    matrices = []
+    for order in orders:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            values = np.moveaxis(differentiated(exponents, order, times), -1, 0)
+        matrices.append(np.concatenate([values[:nodes], np.tensordot(last, values[:nodes], axes=1), values[nodes:]]))
+    return np.stack(matrices)
