@@ -66,7 +66,7 @@ def least_effort(
     cost = np.full(2 * m * segments, time / segments)
     both = np.concatenate([balanced, -balanced], axis=1)
     found = linprog(cost, A_eq=both, b_eq=target / scale, bounds=(0.0, peak), method="highs")
-    if found.x is None:
+    if found.x is None or found.fun is None:
         return None
     forward, backward = np.split(found.x, 2)
     multiplier = found.eqlin.marginals / scale
