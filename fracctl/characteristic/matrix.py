@@ -90,7 +90,7 @@ class CharacteristicMatrix:
 
     def _coefficients(self, entry: Entry) -> Floats:
         shape = (self.batch, entry.exponents.shape[-1])
-        return np.ascontiguousarray(np.broadcast_to(entry.coefficients, shape))
+        return np.array(np.broadcast_to(entry.coefficients, shape), order="C")
 
     def take(self, rows: Array) -> CharacteristicMatrix:
         """Return the matrix of the members `rows`."""

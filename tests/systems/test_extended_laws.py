@@ -106,3 +106,14 @@ def test_members_of_a_batch_have_their_own_time_constants(solver: BatchSolver) -
         form = filtered_pid(*OUT_OF_PLANE, k_p[i], k_i[i], k_d[i], lag[i])
         exact = form.states(np.array([1e-3, 2e-3]), times)[:, 0]
         assert np.abs(trajectory(times)[i, :, 0] - exact).max() < 1e-8 * np.abs(exact).max()
+
+
+@pytest.mark.parametrize("varied", range(3))
+def test_members_of_a_batch_may_share_all_but_one_parameter(varied: int) -> None:
+    values: list[object] = [0.5, 2.0, 0.3]
+    values[varied] = np.array([1.0, 1.0, 0.9, 1.2]) * values[varied]
+    times = check_times(HORIZON)
+    trajectory = Contour().solve(ClosedLoop(HCWOutOfPlane(), PDLag(*values)), [1e-3, 2e-3], HORIZON)
+    for i, (k_p, k_d, lag) in enumerate(np.broadcast(*values)):
+        exact = filtered_pid(*OUT_OF_PLANE, k_p, 0.0, k_d, lag).states(np.array([1e-3, 2e-3]), times)[:, 0]
+        assert np.abs(trajectory(times)[i, :, 0] - exact).max() < 1e-8 * np.abs(exact).max()
