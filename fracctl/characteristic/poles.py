@@ -7,17 +7,24 @@ import numpy as np
 from fracctl.arrays import Complexes
 from fracctl.characteristic.bounds import pole_radius
 from fracctl.characteristic.matrix import CharacteristicMatrix
+from fracctl.characteristic.zeros import Terms, phase_change, search
 from fracctl.errors import ArgumentError
 
 _LIP = 1e-9
 """Angle in rad between the upper lip of the cut and the path along it."""
+_INNERMOST = -30.0
+"""Logarithm of the smallest magnitude of a pole that is looked for."""
+_MARGIN = 0.7
+"""Logarithm of the path's outer radius over the pole radius."""
+_MESHES = ((16, 5), (50, 17), (250, 61))
+"""Radii and angles of the starts, the next where one leaves zeros unfound."""
 
 
 def principal_poles(matrix: CharacteristicMatrix) -> tuple[Complexes, bool]:
     """Return all zeros of det M̃ with |arg σ| < π, and whether their number is that of the argument principle.
 
     Newton's iteration from a polar mesh of the upper half disc of the pole radius, with the zeros found so far
-    divided out. For integer orders the zeros on the negative real axis are found as well.
+    divided out; a double zero is found twice. For integer orders the zeros on the negative real axis are found as well.
 
     Args:
         matrix: the characteristic matrix of a single loop (batch of one).
@@ -32,15 +39,15 @@ def principal_poles(matrix: CharacteristicMatrix) -> tuple[Complexes, bool]:
         raise ArgumentError("matrix", f"a batch of {matrix.batch}", "must belong to a single loop")
     if _integer_orders(matrix):
         return _companion_eigenvalues(matrix), True
-    expected = _count(matrix)
-    radius = float(pole_radius(matrix)[0])
-    poles: list[complex] = []
-    for n_radii, n_angles in ((24, 17), (80, 61), (240, 181)):
-        poles = _distinct(_newton(matrix, _mesh(radius, n_radii, n_angles)))
-        if len(poles) >= expected:
+    terms, outer = _terms(matrix), float(np.log(pole_radius(matrix)[0]))
+    expected = _count(terms, outer)
+    found = np.zeros(0, dtype=np.complex128)
+    for n_radii, n_angles in _MESHES:
+        found = search(terms, _mesh(outer, n_radii, n_angles), expected, np.pi - _LIP)
+        if len(found) >= expected:
             break
-    ordered = sorted(poles, key=lambda p: (-p.real, abs(p.imag), -p.imag))
-    return np.array(ordered, dtype=np.complex128), len(poles) == expected
+    poles = np.exp(found)
+    return poles[np.lexsort((-poles.imag, np.abs(poles.imag), -poles.real))], len(poles) == expected
 
 
 def _integer_orders(matrix: CharacteristicMatrix) -> bool:
@@ -78,51 +85,25 @@ def _companion_eigenvalues(matrix: CharacteristicMatrix) -> Complexes:
     return values[np.lexsort((-values.imag, np.abs(values.imag), -values.real))]
 
 
-def _count(matrix: CharacteristicMatrix) -> int:
-    """Number of zeros with |arg σ| < π - lip, by the argument principle with a densely sampled path."""
-    outer = 2.0 * float(pole_radius(matrix)[0])
-    for n in (2000, 16000, 128000):
-        lip = np.exp(1j * (np.pi - _LIP)) * np.geomspace(outer, 1e-8, n)
-        arc = 1e-8 * np.exp(1j * np.linspace(np.pi - _LIP, 0.0, 400))
-        sweep = outer * np.exp(1j * np.linspace(0.0, np.pi - _LIP, 400))
-        values = matrix.determinant(np.concatenate([sweep, lip[1:], arc[1:]]))[0]
-        steps = np.angle(values[1:] / values[:-1])
-        if np.max(np.abs(steps)) < 1.5:
-            break
-    return round(float(np.sum(steps)) / np.pi)
+def _terms(matrix: CharacteristicMatrix) -> Terms:
+    entries = [(i, k, entry) for i, row in enumerate(matrix.entries) for k, entry in enumerate(row) if entry]
+    counts = [entry.exponents.shape[-1] for _, _, entry in entries]
+    rows, columns = (np.repeat([entry[axis] for entry in entries], counts) for axis in (0, 1))
+    coefficients = np.concatenate([entry.coefficients.ravel() for _, _, entry in entries])
+    exponents = np.concatenate([entry.exponents.ravel() for _, _, entry in entries])
+    return Terms(matrix.size, coefficients, exponents, rows, columns)
 
 
-def _mesh(radius: float, n_radii: int, n_angles: int) -> Complexes:
-    radii = radius * np.geomspace(1e-9, 1.0, n_radii)
+def _count(terms: Terms, outer: float) -> int:
+    """Number of zeros with |arg σ| < π - lip, by the argument principle along the upper half of the border."""
+    top = 1j * (np.pi - _LIP)
+    ends = (outer + _MARGIN, _INNERMOST)
+    corners = np.array([ends[0], ends[0] + top, ends[1] + top, ends[1]], dtype=np.complex128)
+    return round(phase_change(terms, corners) / np.pi)
+
+
+def _mesh(outer: float, n_radii: int, n_angles: int) -> Complexes:
+    """Return starts z = log σ, from the outermost inwards."""
+    radii = np.linspace(outer, _INNERMOST, n_radii)
     angles = np.linspace(0.0, np.pi - 0.02, n_angles)
-    return np.ravel(radii[:, None] * np.exp(1j * angles))
-
-
-def _newton(matrix: CharacteristicMatrix, sigma: Complexes) -> Complexes:
-    """Return where Newton's iteration on det M̃ ends for each start, without the starts that leave the cut plane."""
-    settled = np.zeros(sigma.shape, dtype=bool)
-    with np.errstate(all="ignore"):
-        for _ in range(80):
-            step = 1e-6 * np.abs(sigma)
-            value, ahead, behind = matrix.determinant(np.concatenate([sigma, sigma + step, sigma - step]))[0].reshape(
-                3, -1
-            )
-            change = np.where(value == 0.0, 0.0, -value * 2.0 * step / (ahead - behind))
-            change *= np.minimum(1.0, 0.5 * np.abs(sigma) / np.maximum(np.abs(change), 1e-300))
-            sigma = sigma + change
-            settled = np.abs(change) < 1e-12 * np.abs(sigma)
-            keep = np.isfinite(sigma) & (np.abs(np.angle(sigma)) < np.pi - _LIP)
-            sigma, settled = sigma[keep], settled[keep]
-            if settled.all():
-                break
-    return sigma[settled]
-
-
-def _distinct(zeros: Complexes) -> list[complex]:
-    """Return the different ones of `zeros`, completed by their conjugates."""
-    found: list[complex] = []
-    for zero in zeros:
-        pole = complex(zero.real) if abs(zero.imag) < 1e-9 * abs(zero) else complex(zero.real, abs(zero.imag))
-        if all(abs(pole - p) > 1e-7 * abs(p) for p in found):
-            found += [pole] if pole.imag == 0.0 else [pole, pole.conjugate()]
-    return found
+    return np.ravel(radii[:, None] + 1j * angles).astype(np.complex128)

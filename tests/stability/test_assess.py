@@ -107,3 +107,22 @@ def test_two_weakly_damped_pairs_close_together(k_d: float, split: float) -> Non
 def test_a_batch_is_refused_with_a_sentence() -> None:
     with pytest.raises(ArgumentError, match="`loop` must be a single loop"):
         stability.assess(ClosedLoop(HCWOutOfPlane(), PDAlpha([1.0, 2.0], 1.0)))
+
+
+def test_double_poles_are_found_twice() -> None:
+    """Two equal oscillators: every zero of the determinant is double."""
+    one = stability.assess(ClosedLoop(HCWOutOfPlane(), PDAlpha(0.85, 2.0, 0.91)))
+    plant = LinearPlant(-np.eye(2))
+    two = stability.assess(ClosedLoop(plant, PDAlpha(0.85 * np.eye(2), 2.0 * np.eye(2), 0.91)))
+    assert same_set(two.poles, np.repeat(one.poles, 2), 1e-6)
+    assert "not all" not in two.certificate
+
+
+def test_a_slow_and_a_fast_pole() -> None:
+    """σ² + k_D σ^α + c with small c < 0 has a zero at σ = (-c/k_D)^(1/α), to the order σ^(2-α) relative."""
+    member = loops.out_of_plane(-1.0 - 1e-5, 2.0, 0.5, [1.0, 0.0])
+    verdict = stability.assess(single(member))
+    assert verdict.poles[0] == pytest.approx(25e-12, rel=1e-4)
+    assert "not all" not in verdict.certificate
+    member = loops.out_of_plane(0.0, 1e4, 0.5, [1.0, 0.0])
+    assert same_set(stability.assess(single(member)).poles, poles.poles(member), 1e-7)
