@@ -7,9 +7,12 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from pydantic import ValidationError
 
 from fracctl.arrays import Floats
 from fracctl.config import registry
+from fracctl.config.fields import lines_of, refuse
+from fracctl.config.messages import InvalidConfiguration, problems
 from fracctl.config.options import construct
 from fracctl.config.schemas import AccuracyEvaluation, GridSurvey, RunConfig, SingleSurvey
 from fracctl.errors import ConfigurationError
@@ -45,7 +48,11 @@ def build_evaluation(config: RunConfig) -> Evaluation:
 
 
 def build_survey(config: RunConfig, evaluation: Evaluation) -> Survey:
-    """Return what decides which design points are evaluated."""
+    """Return what decides which design points are evaluated.
+
+    Raises:
+        ConfigurationError: an option does not fit the rest of the run.
+    """
     parameters = evaluation.parameters
     survey = config.survey
     if isinstance(survey, SingleSurvey) and not evaluation.axes:
@@ -56,7 +63,10 @@ def build_survey(config: RunConfig, evaluation: Evaluation) -> Survey:
         fixed = {name: parameters[name] for name in evaluation.design_variables if name not in axes}
         return Grid(axes, grid.slice, grid.baseline, fixed)
     factory = registry.load("surveys", survey.type)
-    built: Survey = construct(factory, survey, evaluation=evaluation, seed=config.seed)
+    try:
+        built: Survey = construct(factory, survey, evaluation=evaluation, seed=config.seed)
+    except ValidationError as error:
+        raise InvalidConfiguration(problems(refuse(*lines_of(error, ("survey",))))) from error
     return built
 
 

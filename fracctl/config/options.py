@@ -99,11 +99,16 @@ def _call(factory: Factory, arguments: dict[str, Any], path: Path) -> Any:
 
 
 def _refused(error: ArgumentError, arguments: Mapping[str, Any], path: Path) -> InitErrorDetails:
-    if error.name not in arguments:
-        return refusal(path, arguments, str(error), "sentence")
+    keys = error.name.split(".")
+    value: Any = arguments
+    for key in keys:
+        entries = value if isinstance(value, Mapping) else getattr(value, "__dict__", {})
+        if key not in entries:
+            return refusal(path, arguments, str(error), "sentence")
+        value = entries[key]
     shape = f", but is {error.value}" if str(error.value).startswith("of shape") else ""
     cure = f"; {error.instead}" if error.instead else ""
-    return refusal((*path, error.name), arguments[error.name], f"{error.allowed}{shape}{cure}")
+    return refusal((*path, *keys), value, f"{error.allowed}{shape}{cure}")
 
 
 def _hints(factory: Factory) -> dict[str, Any]:
@@ -129,6 +134,8 @@ def _schema(hint: Any) -> Any:
         return options_of(hint)
     if typing.get_origin(hint) in (typing.Union, types.UnionType):
         return typing.Union[tuple(_schema(part) for part in typing.get_args(hint))]  # noqa: UP007 - made at run time
+    if typing.get_origin(hint) in (list, dict):
+        return typing.get_origin(hint)[tuple(_schema(part) for part in typing.get_args(hint))]
     return hint
 
 

@@ -46,7 +46,13 @@ BUILT_IN: Mapping[str, Mapping[str, str]] = {
         "overshoot": "fracctl.measures:Overshoot",
         "control_effort": "fracctl.measures:ControlEffort",
     },
-    "surveys": {"single": "fracctl.surveys:Single", "grid": "fracctl.surveys:Grid"},
+    "surveys": {
+        "single": "fracctl.surveys:Single",
+        "grid": "fracctl.surveys:Grid",
+        "lqr_seed": "fracctl.surveys:LQRSeed",
+        "pattern_search": "fracctl.surveys:PatternSearchSurvey",
+        "continuation": "fracctl.surveys:Continuation",
+    },
     "conf": {},
 }
 """Kind, then name, to ``module:attribute``."""

@@ -21,6 +21,7 @@ GROUPS = (
     "initial_condition",
     "solver",
     "measures",
+    "objectives",
     "evaluation",
     "survey",
     "scheduler",
@@ -41,6 +42,9 @@ COMPANIONS = {
     "controller=pi_lambda_d_mu_in_plane": ["plant=hcw_in_plane"],
     "initial_condition=radial": ["plant=hcw_in_plane", "controller=pdd_alpha_in_plane"],
     "initial_condition=own": ["initial_condition.own.w=1e-3"],
+    "objectives=in_plane": ["objective=st_os"],
+    "survey=in_plane": ["plant=hcw_in_plane", "controller=pd_alpha_in_plane"],
+    "figures=paper_6_to_9": ["initial_condition=[ic1,ic2,ic3]", "objectives=in_plane", "objective=st_os"],
     "figures=paper_2_to_5": ["initial_condition=[ic1,ic2,ic3]", "survey=out_of_plane"],
 }
 """What an option needs beside it."""
@@ -58,6 +62,14 @@ TINY_SETTINGS = {
     + ["evaluation.members=2", "evaluation.repeats=1"]
 }
 """What else an experiment needs for a tiny budget."""
+CONTINUATIONS = ("ic1_inplane", "ic2_inplane", "ic3_inplane", "inplane")
+TINY_CONTINUATION = [
+    "survey.axes.alpha_u=[0.99,1.0]",
+    "survey.axes.alpha_v=1.0",
+    "survey.first_steps=[0.5]",
+    "survey.steps=[0.5]",
+    "scheduler=serial",
+]
 SINGLE = ("inplane_decoupled",)
 """Experiments of one design point, which have no budget."""
 
@@ -86,7 +98,22 @@ def test_an_experiment_bears_its_name(name: str) -> None:
     assert compose([f"experiment={name}"]).name == name
 
 
-@pytest.mark.parametrize("name", EXPERIMENTS)
+@pytest.mark.parametrize("name", CONTINUATIONS)
+def test_a_continuation_runs_on_a_tiny_budget(name: str, tmp_path: Path) -> None:
+    config = compose([f"experiment={name}", *TINY_CONTINUATION, f"output_dir={tmp_path}"])
+    result = execute(config)
+    tracks = len(config.objectives) * len(config.initial_condition)
+    assert result.summary["status"] == "finished"
+    assert result.evaluations["point"].nunique() == 2 * tracks
+    assert result.optima.groupby("kind").size().to_dict() == {
+        "overall": tracks,
+        "baseline": tracks,
+        "slice": 2 * tracks,
+    }
+    assert {path.stem for path in (result.run_directory / "figures").glob("*.pdf")} == set(config.figures)
+
+
+@pytest.mark.parametrize("name", sorted({*EXPERIMENTS} - {*CONTINUATIONS}))
 def test_an_experiment_runs_on_a_tiny_budget(name: str, tmp_path: Path) -> None:
     budget = [] if name in SINGLE else [*TINY, *TINY_SETTINGS.get(name, [])]
     config = compose([f"experiment={name}", *budget, f"output_dir={tmp_path}"])
@@ -95,6 +122,16 @@ def test_an_experiment_runs_on_a_tiny_budget(name: str, tmp_path: Path) -> None:
     assert result.summary["status"] == "finished"
     assert len(result.evaluations) == (1 if name in SINGLE else 8) * settings * len(config.initial_condition)
     assert {path.stem for path in (result.run_directory / "figures").glob("*.pdf")} == set(config.figures)
+
+
+def test_the_papers_orders() -> None:
+    evaluation, survey = build_checked(compose(["experiment=inplane"]))
+    assert survey.slices == ("alpha_u", "alpha_v")
+    assert survey.n_points == 3 * 2 * (1 + 20 + 2 * 100), "a search from every neighbour"
+    assert dict(evaluation.objectives) == {
+        "st_os": ("settling_time", "overshoot"),
+        "st_u": ("settling_time", "control_effort"),
+    }
 
 
 def test_the_papers_grid() -> None:
