@@ -12,7 +12,7 @@ from fracctl.errors import ArgumentError
 
 _LIP = 1e-9
 """Angle in rad between the upper lip of the cut and the path along it."""
-_INNERMOST = -30.0
+_INNERMOST = -40.0
 """Logarithm of the smallest magnitude of a pole that is looked for."""
 _MARGIN = 0.7
 """Logarithm of the path's outer radius over the pole radius."""
@@ -24,7 +24,8 @@ def principal_poles(matrix: CharacteristicMatrix) -> tuple[Complexes, bool]:
     """Return all zeros of det M̃ with |arg σ| < π, and whether their number is that of the argument principle.
 
     Newton's iteration from a polar mesh of the upper half disc of the pole radius, with the zeros found so far
-    divided out; a double zero is found twice. For integer orders the zeros on the negative real axis are found as well.
+    divided out; a double zero is found twice, one with |σ| < 4e-18 not at all. For integer orders the zeros on the
+    negative real axis are found as well.
 
     Args:
         matrix: the characteristic matrix of a single loop (batch of one).
