@@ -157,8 +157,8 @@ def _table(config: RunConfig) -> ResultTable:
     """A table without the many gains of a large plant that the survey leaves alone."""
     survey, controller = config.survey.model_dump(), config.controller.model_dump(exclude={"type"})
     unvaried = [name for name in controller if name not in survey.get("axes", {})]
-    hidden = unvaried if len(controller) > MOST_DESIGN_VARIABLES else []
-    return ResultTable(config.objectives, hidden, "result" if survey["type"] == "single" else "optimum")
+    hidden = unvaried if len(controller) > MOST_DESIGN_VARIABLES and survey["type"] in ("single", "grid") else []
+    return ResultTable(config.objectives, hidden, "result" if survey["type"] in ("single", "lqr_seed") else "optimum")
 
 
 def _report(failures: Sequence[tuple[_Job, Exception]], options: argparse.Namespace, several: bool) -> int:

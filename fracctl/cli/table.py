@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 TURN = 2.0 * math.pi
+
+MOST_COLUMNS = 9
+"""With more columns than this a result is written from top to bottom."""
 
 _AFTER_THE_MEASURES = "objective"
 
@@ -41,25 +45,61 @@ class ResultTable:
         for name in dict.fromkeys(result.get("objective_name") for result in results):
             of_name = [result for result in results if result.get("objective_name") == name]
             lines.append(_title(name, self.objectives.get(str(name), ())))
-            lines += table([row for result in of_name for row in self._rows(result, name, result is of_name[0])])
+            lines += table(self._upright(of_name, name) if self._is_long(of_name, name) else self._flat(of_name, name))
         return lines
 
-    def _rows(self, result: Mapping[str, Any], name: str | None, first: bool) -> Iterator[list[str]]:
-        optimum, baseline, change = result["optimum"], result["baseline"], result["change_percent"]
+    def _flat(self, results: Sequence[Mapping[str, Any]], name: str | None) -> list[list[str]]:
+        """A row for each point."""
+        rows: list[list[str]] = []
+        for result in results:
+            columns = self._columns(result, name)
+            if not rows and columns:
+                rows.append(["", "", *_headings(columns, name)])
+            rows += self._points(result, columns)
+            if result["change_percent"] is not None:
+                rows.append(["", "change", _percent(result)])
+        return rows
+
+    def _upright(self, results: Sequence[Mapping[str, Any]], name: str | None) -> list[tuple[str, ...]]:
+        """A column for each point."""
+        shown = next(filter(None, (self._columns(result, name) for result in results)))
+        columns = [["", "", *_headings(shown, name), "change"]]
+        for result in results:
+            points = self._points(result, self._columns(result, name))
+            change = _percent(result) if result["change_percent"] is not None else ""
+            columns += [[*point, end] for point, end in zip(points, (change, ""), strict=False)]
+        rows = list(itertools.zip_longest(*columns, fillvalue=""))
+        return [row for row in rows if any(row[1:])]
+
+    def _is_long(self, results: Sequence[Mapping[str, Any]], name: str | None) -> bool:
+        return any(len(self._columns(result, name)) > MOST_COLUMNS for result in results)
+
+    def _columns(self, result: Mapping[str, Any], name: str | None) -> list[str]:
+        if result["optimum"] is None:
+            return []
+        columns = [column for column in _columns(result["optimum"]) if column not in self.hidden]
+        return columns + ([f"objective_{name}"] if len(self.objectives.get(str(name), ())) > 1 else [])
+
+    def _points(self, result: Mapping[str, Any], columns: Sequence[str]) -> list[list[str]]:
+        """Optimum and baseline: initial condition, what it is, and the columns' values."""
+        optimum, baseline = result["optimum"], result["baseline"]
         condition = str(result.get("initial_condition") or (optimum or {}).get("initial_condition") or "")
         if optimum is None:
-            yield [condition, f"no {self.best}"]
-            return
-        columns = [column for column in _columns(optimum) if column not in self.hidden]
-        columns += [f"objective_{name}"] if len(self.objectives.get(str(name), ())) > 1 else []
-        if first:
-            yield ["", "", *[heading for column in columns for heading in _heading(column, name)]]
-        for label, values in ((self.best, optimum), ("baseline", baseline)):
-            if values is not None:
-                shown = [cell for column in columns for cell in _cells(column, values.get(column))]
-                yield [condition if values is optimum else "", label, *shown]
-        if change is not None:
-            yield ["", "change", f"{change:+.1f} %"]
+            return [[condition, f"no {self.best}"]]
+        named = [(condition, self.best, optimum), ("", "baseline", baseline)]
+        return [
+            [where, label, *(cell for column in columns for cell in _cells(column, values.get(column)))]
+            for where, label, values in named
+            if values is not None
+        ]
+
+
+def _headings(columns: Sequence[str], name: str | None) -> list[str]:
+    return [heading for column in columns for heading in _heading(column, name)]
+
+
+def _percent(result: Mapping[str, Any]) -> str:
+    return f"{result['change_percent']:+.1f} %"
 
 
 def number(value: Any, digits: int = 6) -> str:
@@ -71,9 +111,9 @@ def number(value: Any, digits: int = 6) -> str:
     return f"{value:.{digits}g}"
 
 
-def count(how_many: int, what: str) -> str:
-    """``1 point``, ``2 points``."""
-    return f"{how_many} {what}" + ("" if how_many == 1 else "s")
+def count(how_many: int, what: str, plural: str = "s") -> str:
+    """``1 point``, ``2 points``, ``2 searches``."""
+    return f"{how_many} {what}" + ("" if how_many == 1 else plural)
 
 
 def _title(name: str | None, factors: Sequence[str]) -> str:

@@ -35,14 +35,14 @@ def execute(options: argparse.Namespace) -> int:
     words: list[str] = options.overrides
     if len(words) == 1 and "=" not in words[0] and Path(words[0]).is_dir():
         return _validate_run(Path(words[0]))
+    from fracctl.cli.words import extent
     from fracctl.config.build import build_checked
     from fracctl.config.compose import compose
 
     config = compose(words, options.config_dir)
     evaluation, survey = build_checked(config)
-    points = "points as the survey decides" if survey.n_points is None else count(survey.n_points, "design point")
     conditions = count(len(evaluation.initial_conditions), "initial condition")
-    output.say(f"valid: {config.name}, {points}, {conditions}")
+    output.say(f"valid: {config.name}, {extent(survey)}, {conditions}")
     return 0
 
 

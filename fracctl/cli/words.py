@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import inspect
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 from fracctl.cli.table import count, number, table
-from fracctl.config.schemas import GridSurvey, RunConfig
+from fracctl.config.schemas import GridSurvey, RunConfig, SingleSurvey
 from fracctl.evaluation import Evaluation
 from fracctl.plants import Chief, LinearPlant
 from fracctl.store.identity import run_id
 from fracctl.surveys import Survey, axis_values
+from fracctl.surveys.base import SEARCHED_FOR
 from fracctl.units import Scales
 
 _Row = tuple[str, str]
@@ -88,16 +89,22 @@ def _objectives(evaluation: Evaluation) -> Iterator[_Row]:
         yield "" if place else "minimises", f"{name}{mean}" + ("" if place else " (primary)")
 
 
+def extent(survey: Survey) -> str:
+    """Return how many design points or searches a survey asks for."""
+    if SEARCHED_FOR in survey.columns:
+        return "as many searches as it needs" if survey.n_points is None else count(survey.n_points, "search", "es")
+    return "as many design points as it needs" if survey.n_points is None else count(survey.n_points, "design point")
+
+
 def _survey(config: RunConfig, evaluation: Evaluation, survey: Survey) -> Iterator[_Row]:
-    conditions = len(evaluation.initial_conditions)
-    points = survey.n_points
-    many = "as many design points as it needs" if points is None else count(points, "design point")
-    yield "survey", f"{config.survey.type}: {many}, {count(conditions, 'initial condition')}"
-    if not isinstance(config.survey, GridSurvey):
-        return
-    for name, spec in config.survey.axes.items():
+    conditions = count(len(evaluation.initial_conditions), "initial condition")
+    yield "survey", f"{config.survey.type}: {extent(survey)}, {conditions}"
+    if not isinstance(config.survey, GridSurvey | SingleSurvey):
+        yield "", _described(survey)
+        yield "", _options(config.survey, hidden=("axes", "start"))
+    for name, spec in getattr(config.survey, "axes", {}).items():
         values = axis_values(spec, name)
-        yield "", f"{name} from {number(values[0])} to {number(values[-1])}, {len(values)} values"
+        yield "", f"{name} from {number(values[0])} to {number(values[-1])}, {count(len(values), 'value')}"
     if survey.slices and evaluation.objectives:
         yield "", f"the best point is kept for each {' and '.join(survey.slices)}"
     if survey.baseline:
@@ -116,9 +123,14 @@ def _directory(config: RunConfig) -> Path:
     return Path(config.output_dir).absolute() / config.name / run_id(config.model_dump(mode="json"))
 
 
+def _described(thing: Any) -> str:
+    """The first sentence of a docstring."""
+    return (inspect.getdoc(thing) or "").partition("\n")[0].rstrip(".")
+
+
 def _sentence(thing: Any, name: str, options: str) -> str:
     """Name, options, and the first sentence of a docstring."""
-    described = (inspect.getdoc(thing) or "").partition("\n")[0].rstrip(".")
+    described = _described(thing)
     return f"{name}" + (f", {options}" if options else "") + (f": {described}" if described else "")
 
 
@@ -128,9 +140,15 @@ def _equation(thing: Any) -> list[str]:
     return [line.partition("  (")[0].strip() for line in lines if line.startswith("    ")][:1]
 
 
-def _options(options: Any) -> str:
-    given: Mapping[str, Any] = options.model_dump(exclude={"type"})
-    return ", ".join(f"{name} {number(value)}" for name, value in given.items() if value is not None)
+def _options(options: Any, hidden: Collection[str] = ()) -> str:
+    given: Mapping[str, Any] = options.model_dump(exclude={"type", *hidden})
+    return ", ".join(f"{name} {_option(value)}" for name, value in given.items() if value is not None)
+
+
+def _option(value: Any) -> str:
+    if isinstance(value, Mapping):
+        return "(" + ", ".join(f"{name} {_option(entry)}" for name, entry in value.items()) + ")"
+    return f"[{', '.join(map(_option, value))}]" if isinstance(value, list) else number(value)
 
 
 def _time(value: float, scales: Scales | None) -> str:

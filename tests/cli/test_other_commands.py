@@ -77,6 +77,20 @@ def test_show_speaks_in_units(capsys: pytest.CaptureFixture[str]) -> None:
         assert part in text
 
 
+def test_show_says_what_a_search_does(capsys: pytest.CaptureFixture[str]) -> None:
+    text = "\n".join(lines(capsys, "show", "experiment=ic1_inplane"))
+    for part in (
+        "continuation: 442 searches, 1 initial condition",
+        "Searches for the best gains at every order, outward from a start",
+        "first_steps [0.1, 0.05], steps [0.05], bounds [-8, 8], lqr (q 1, r 1, round_to 0.05)",
+        "alpha_v from 0.9 to 1, 11 values",
+        "the best point is kept for each alpha_u and alpha_v",
+        "compared with the best point of alpha_u = 1, alpha_v = 1",
+    ):
+        assert part in text
+    assert lines(capsys, "validate", "experiment=inplane") == ["valid: inplane, 1326 searches, 3 initial conditions"]
+
+
 def test_show_without_units(capsys: pytest.CaptureFixture[str]) -> None:
     words = ["plant=linear", "controller=pd_alpha_own", "initial_condition=own", "initial_condition.own.x=1"]
     text = "\n".join(lines(capsys, "show", *words))

@@ -88,6 +88,36 @@ def test_several_objectives_and_initial_conditions(capsys: pytest.CaptureFixture
     assert lines[7].split()[-1] == "0.395"
 
 
+def test_many_gains_stand_below_each_other(capsys: pytest.CaptureFixture[str], stand_in: StandIn) -> None:
+    names = ("alpha_u", "alpha_v", "k_p_u", "k_p_uv", "k_p_vu", "k_p_v", "k_d_u", "k_d_uv", "k_d_vu", "k_d_v")
+    measured = {
+        "settling_time": 3.7,
+        "overshoot": 6.6,
+        "control_effort": 2e-3,
+        "objective": 4.9,
+        "objective_st_os": 4.9,
+    }
+    point = {"initial_condition": "ic1"} | {name: float(i) for i, name in enumerate(names)} | measured
+    stand_in.further["optima"] = [
+        {"initial_condition": "ic1", "objective_name": "st_os", "optimum": None, "baseline": None}
+        | {"change_percent": None},
+        {"initial_condition": "ic2", "objective_name": "st_os", "optimum": point, "baseline": point | {"k_d_v": 9.5}}
+        | {"change_percent": -1.25},
+    ]
+    assert main(["run", "experiment=ic1_inplane"]) == 0
+    lines = [line.split() for line in capsys.readouterr().out.splitlines()[1:-1]]
+    assert lines[:3] == [
+        ["st_os", "=", "(settling_time", "·", "overshoot)^(1/2)"],
+        ["ic1", "ic2"],
+        ["no", "optimum", "optimum", "baseline"],
+    ]
+    assert [line[0] for line in lines[3:13]] == list(names)
+    assert lines[12:15] == [
+        ["k_d_v", "9", "9.5"], ["settling_time", "3.7", "3.7"], ["0.5889", "T", "0.5889", "T"]
+    ]  # fmt: skip
+    assert lines[-2:] == [["st_os", "4.9", "4.9"], ["change", "-1.2", "%"]]
+
+
 def test_many_gains_that_do_not_vary_are_not_shown(capsys: pytest.CaptureFixture[str], stand_in: StandIn) -> None:
     assert main(["run", "plant=hcw", "controller=pd_alpha_full"]) == 0
     lines = capsys.readouterr().out.splitlines()
