@@ -45,6 +45,7 @@ BUILT_IN: Mapping[str, Mapping[str, str]] = {
         "settling_time": "fracctl.measures:SettlingTime",
         "overshoot": "fracctl.measures:Overshoot",
         "control_effort": "fracctl.measures:ControlEffort",
+        "peak_acceleration": "fracctl.measures:PeakAcceleration",
     },
     "surveys": {
         "single": "fracctl.surveys:Single",
@@ -52,6 +53,7 @@ BUILT_IN: Mapping[str, Mapping[str, str]] = {
         "lqr_seed": "fracctl.surveys:LQRSeed",
         "pattern_search": "fracctl.surveys:PatternSearchSurvey",
         "continuation": "fracctl.surveys:Continuation",
+        "search": "fracctl.surveys:PopulationSearch",
     },
     "conf": {},
 }

@@ -7,6 +7,7 @@ from fracctl.surveys.grid import Grid
 from fracctl.surveys.lqr_seed import LQRSeed, LQRWeights
 from fracctl.surveys.optima import Optima
 from fracctl.surveys.pattern_search import PatternSearch
+from fracctl.surveys.search import PopulationSearch
 from fracctl.surveys.single import Single
 
 __all__ = [
@@ -18,6 +19,7 @@ __all__ = [
     "Optima",
     "PatternSearch",
     "PatternSearchSurvey",
+    "PopulationSearch",
     "Search",
     "Single",
     "Survey",
