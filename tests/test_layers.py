@@ -14,6 +14,7 @@ BOTTOM_UP = (
     "errors",
     "units",
     "arrays",
+    "compiling",
     "fractional",
     "plants",
     "controllers",

@@ -5,14 +5,14 @@ M̃ → I as |σ| → ∞; its zeros off the cut (-∞, 0] are the principal-she
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from fracctl.arrays import Array, Complexes, Floats
 from fracctl.fractional.system import LinearFractionalSystem
-from fracctl.fractional.terms import FractionalTerm, powers
+from fracctl.fractional.terms import powers
 
 
 @dataclass(frozen=True)
@@ -42,16 +42,21 @@ class Entry:
     def _lead(self) -> tuple[int, ...]:
         return np.broadcast_shapes(self.coefficients.shape[:-1], self.exponents.shape[:-1])
 
-    def magnitude(self, radius: Floats) -> Floats:
-        """Return Σ_e |c_e| r^e for radii r (b,)."""
-        total: Floats = np.sum(np.abs(self.coefficients) * radius[:, None] ** self.exponents, axis=-1)
-        return total
 
+class Powers(NamedTuple):
+    """All entries of a block as one list of K powers c σ^e, each in its row and column of the block."""
 
-PowerTable = Callable[[Floats], tuple[Floats, Floats]]
-"""From exponents (J,) or (b, J) to real and imaginary parts of powers along a path, (1, J, P) or (b, J, P)."""
+    coefficients: Floats
+    """c, (b, K)."""
+    exponents: Floats
+    """e, (1, K) where members share them, (b, K) otherwise."""
+    place: Array
+    """Row and column, (K, 2)."""
 
-_ZERO = Entry(np.zeros(1), np.zeros(1))
+    def take(self, rows: Array) -> Powers:
+        """Return those of the members `rows`."""
+        exponents = self.exponents[rows] if len(self.exponents) > 1 else self.exponents
+        return Powers(self.coefficients[rows], exponents, self.place)
 
 
 class CharacteristicMatrix:
@@ -66,9 +71,7 @@ class CharacteristicMatrix:
         self.size = system.size
         self.batch = system.batch or 1
         self.highest = system.highest
-        self.entries = [
-            [_entry(system.dynamics, i, k, float(self.highest[k])) for k in range(self.size)] for i in range(self.size)
-        ]
+        self.entries = _entries(system)
 
     def __call__(self, sigma: Complexes) -> list[list[Complexes | None]]:
         """Return the entries at nodes σ, each (k,) or (b, k), or None where the entry is zero."""
@@ -83,25 +86,33 @@ class CharacteristicMatrix:
             groups = [group for group in groups if not group & linked] + [linked.union(*joined)]
         return sorted(sorted(group) for group in groups)
 
-    def tables(self, block: list[int], table: PowerTable) -> tuple[tuple[Floats, Floats, Floats], ...]:
-        """Return the entries of a block, row by row, as coefficients (b, J) and the table of their powers."""
-        entries = [self.entries[i][k] or _ZERO for i in block for k in block]
-        return tuple((self._coefficients(entry), *table(entry.exponents)) for entry in entries)
-
-    def _coefficients(self, entry: Entry) -> Floats:
-        shape = (self.batch, entry.exponents.shape[-1])
-        return np.array(np.broadcast_to(entry.coefficients, shape), order="C")
+    def powers_of(self, block: list[int]) -> Powers:
+        """Return the powers of a block."""
+        entries = [
+            (i, k, entry)
+            for i, row in enumerate(block)
+            for k, column in enumerate(block)
+            if (entry := self.entries[row][column])
+        ]
+        counts = [entry.exponents.shape[-1] for _, _, entry in entries]
+        shared = all(entry.exponents.ndim == 1 for _, _, entry in entries)
+        coefficients = np.empty((self.batch, sum(counts)))
+        exponents = np.empty((1 if shared else self.batch, sum(counts)))
+        at = 0
+        for (_, _, entry), count in zip(entries, counts, strict=True):
+            coefficients[:, at : at + count], exponents[:, at : at + count] = entry.coefficients, entry.exponents
+            at += count
+        place = np.repeat([(i, k) for i, k, _ in entries], counts, axis=0)
+        return Powers(coefficients, exponents, place)
 
     def take(self, rows: Array) -> CharacteristicMatrix:
         """Return the matrix of the members `rows`."""
         return CharacteristicMatrix(self.system.take(rows))
 
-    def determinant(self, sigma: Complexes, block: list[int] | None = None) -> Complexes:
-        """Return det M̃, or that of a block of it, at nodes σ, (k,) shared or (b, k) one set a member, as (b, k)."""
+    def determinant(self, sigma: Complexes) -> Complexes:
+        """Return det M̃ at nodes σ, (k,) shared or (b, k) one set a member, as (b, k)."""
         shape = (self.batch, sigma.shape[-1])
-        rows = range(self.size) if block is None else block
-        entries = [[entry(sigma) if (entry := self.entries[i][k]) else None for k in rows] for i in rows]
-        return np.broadcast_to(determinant(entries, shape), shape)
+        return np.broadcast_to(determinant(self(sigma), shape), shape)
 
 
 def determinant(entries: list[list[Complexes | None]], shape: tuple[int, ...]) -> Complexes:
@@ -132,18 +143,23 @@ def stack(entries: list[list[Complexes | None]], shape: tuple[int, ...]) -> Comp
     return matrix
 
 
-def _entry(terms: tuple[FractionalTerm, ...], row: int, column: int, highest: float) -> Entry | None:
-    """Collect entry (row, column) of the terms, merging equal shared orders; None where it is zero."""
-    shared: dict[float, Floats] = {}
-    own: list[tuple[Floats, Floats]] = []
-    for term in terms:
-        coefficient, order = term.matrix[..., row, column], term.orders[..., column] - highest
-        if not np.any(coefficient):
-            continue
-        if order.ndim == 0:
-            shared[float(order)] = shared.get(float(order), np.zeros(())) + coefficient
-        else:
-            own.append((coefficient, order))
+def _entries(system: LinearFractionalSystem) -> list[list[Entry | None]]:
+    """Collect the terms entry by entry, merging equal shared orders; None where an entry is zero."""
+    highest, size = system.highest.tolist(), range(system.size)
+    shared: list[list[dict[float, Floats]]] = [[{} for _ in size] for _ in size]
+    own: list[list[list[tuple[Floats, Floats]]]] = [[[] for _ in size] for _ in size]
+    for term in system.dynamics:
+        for i, k in np.argwhere(term.matrix.any(axis=0) if term.matrix.ndim == 3 else term.matrix).tolist():
+            coefficient, order = term.matrix[..., i, k], term.orders[..., k] - highest[k]
+            if order.ndim == 0:
+                known = shared[i][k]
+                known[float(order)] = known[float(order)] + coefficient if float(order) in known else coefficient
+            else:
+                own[i][k].append((coefficient, order))
+    return [[_entry(shared[i][k], own[i][k]) for k in size] for i in size]
+
+
+def _entry(shared: dict[float, Floats], own: list[tuple[Floats, Floats]]) -> Entry | None:
     if not shared and not own:
         return None
     coefficients = [*shared.values(), *(c for c, _ in own)]
@@ -152,4 +168,11 @@ def _entry(terms: tuple[FractionalTerm, ...], row: int, column: int, highest: fl
 
 
 def _columns(values: list[Floats]) -> Floats:
-    return np.ascontiguousarray(np.stack(np.broadcast_arrays(*values), axis=-1))
+    """Return numbers () and one a member, (b,), as columns, (J,) or (b, J)."""
+    batches = [len(value) for value in values if value.ndim]
+    if not batches:
+        return np.array(values)
+    columns = np.empty((max(batches), len(values)))
+    for j, value in enumerate(values):
+        columns[:, j] = value
+    return columns

@@ -30,10 +30,10 @@ class FractionalTerm:
     """β, (p,) or (b, p)."""
 
     def __post_init__(self) -> None:
-        outside = self.orders[(self.orders < LOWEST_ORDER) | (self.orders > HIGHEST_ORDER)]
-        if outside.size:
+        lowest, highest = self.orders.min(initial=0.0), self.orders.max(initial=0.0)
+        if lowest < LOWEST_ORDER or highest > HIGHEST_ORDER:
             allowed = f"must lie in [{LOWEST_ORDER:g}, {HIGHEST_ORDER:g}]"
-            raise ArgumentError("orders", outside.flat[0], allowed)
+            raise ArgumentError("orders", lowest if lowest < LOWEST_ORDER else highest, allowed)
         if self.matrix.shape[-1] != self.orders.shape[-1]:
             allowed = f"must have one order for each of the {self.matrix.shape[-1]} columns of `matrix`"
             raise ArgumentError("orders", f"of shape {self.orders.shape}", allowed)
@@ -47,7 +47,7 @@ class FractionalTerm:
 
     def take(self, rows: np.ndarray) -> FractionalTerm:
         """Return the members `rows` of the batch."""
-        matrix = self.matrix[rows] if self.matrix.ndim == 3 and self.matrix.shape[0] > 1 else self.matrix
+        matrix = self.matrix.take(rows, axis=0) if self.matrix.ndim == 3 and self.matrix.shape[0] > 1 else self.matrix
         orders = self.orders[rows] if self.orders.ndim == 2 and self.orders.shape[0] > 1 else self.orders
         return FractionalTerm(matrix, orders)
 

@@ -66,12 +66,14 @@ def equal_orders(system: LinearFractionalSystem, fewest: int) -> Iterator[Array]
     """
     batch = system.batch or 1
     own = [term.orders for term in (*system.dynamics, *system.control) if term.orders.ndim == 2]
-    if not own:
+    different = [column for orders in own for column in orders.T if np.any(column != column[0])]
+    if not different:
         yield np.arange(batch)
         return
-    table = np.concatenate([np.broadcast_to(o, (batch, o.shape[-1])) for o in own], axis=1)
-    _, which = np.unique(table, axis=0, return_inverse=True)
-    which = which.ravel()
+    which = np.zeros(batch, dtype=np.intp)
+    for column in different:
+        values, numbers = np.unique(column, return_inverse=True)
+        which = np.unique(which * len(values) + numbers, return_inverse=True)[1]
     counts = np.bincount(which)
     few = counts[which] < fewest
     if few.any():

@@ -4,10 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.linalg import block_diag
+from scipy.optimize import brentq
 
 from fracctl.characteristic import CharacteristicMatrix, abscissa_bound, principal_poles, unstable_zeros
 from fracctl.characteristic.bounds import pole_radius
+from fracctl.controllers import PDAlpha
 from fracctl.errors import ArgumentError
+from fracctl.loop import ClosedLoop
+from fracctl.plants import HCWInPlane, LinearPlant
 from tests.references import loops, poles
 from tests.references.loops import Loop
 from tests.references.product import closed_loop
@@ -29,6 +34,91 @@ def test_counts_of_a_batch_out_of_plane() -> None:
     zeros, marginal = unstable_zeros(CharacteristicMatrix(closed_loop(members).system))
     assert not marginal.any()
     np.testing.assert_array_equal(zeros, [poles.unstable_count(member) for member in members])
+
+
+def characteristic(
+    plant: LinearPlant, k_p: np.ndarray, k_d: np.ndarray, alpha: float | list[float]
+) -> CharacteristicMatrix:
+    return CharacteristicMatrix(ClosedLoop(plant, PDAlpha(k_p, k_d, alpha)).system)
+
+
+@pytest.mark.parametrize("size", [1, 2, 3, 4, 5])
+def test_counts_at_integer_orders_are_those_of_eigenvalues(size: int) -> None:
+    generator = np.random.default_rng(size)
+    k_p, k_d = generator.uniform(-6.0, 6.0, (2, 100, size, size))
+    k_p, k_d = k_p + 6.0 * np.eye(size), k_d + 6.0 * np.eye(size)
+    zeros, marginal = unstable_zeros(characteristic(LinearPlant(np.zeros((size, size))), k_p, k_d, 1.0))
+    eye = np.broadcast_to(np.eye(size), k_p.shape)
+    companion = np.block([[np.zeros_like(eye), eye], [-k_p, -k_d]])
+    assert not marginal.any()
+    np.testing.assert_array_equal(zeros, (np.linalg.eigvals(companion).real > 0.0).sum(axis=1))
+    assert len(set(zeros)) > 2 or size == 1
+
+
+@pytest.mark.parametrize("size", [2, 3, 4])
+@pytest.mark.parametrize("alpha", [1.0, 0.9])
+def test_weakly_damped_pairs_close_together_in_coupled_coordinates(size: int, alpha: float) -> None:
+    """T diag(ω²) T⁻¹ and d T diag(ω) T⁻¹: all pairs cross the axis, or none, and turn the phase by 2π each at once."""
+    generator = np.random.default_rng(10 * size)
+    batch = 200
+    frequencies = 10.0 ** generator.uniform(-2.0, 1.0, (batch, 1)) * (
+        1.0 + 10.0 ** generator.uniform(-9.0, -1.0, (batch, 1)) * generator.uniform(0.0, 1.0, (batch, size))
+    )
+    damping = 10.0 ** generator.uniform(-7.0, -1.0, batch) * generator.choice([-1.0, 1.0], batch)
+    modes = np.linalg.qr(generator.normal(size=(batch, size, size)))[0]
+    k_p, k_d = (
+        modes @ (values[:, :, None] * modes.swapaxes(1, 2))
+        for values in (frequencies**2, damping[:, None] * frequencies)
+    )
+    zeros, marginal = unstable_zeros(characteristic(LinearPlant(np.zeros((size, size))), k_p, k_d, alpha))
+    assert not marginal[np.abs(damping) ** size > 1e-12].any(), "the determinant stands out from rounding"
+    expected = np.where(damping < 0.0, 2.0 * size, 0.0)
+    np.testing.assert_array_equal(zeros[~marginal], expected[~marginal])
+
+
+def test_zeros_close_to_the_origin_are_counted() -> None:
+    """σ² + k σ^α + c with k < 0 < c: two zeros with Re σ > 0, however small, as Im < 0 on the upper axis."""
+    generator = np.random.default_rng(3)
+    c, k = 10.0 ** generator.uniform(-11.0, 0.0, 400), -(10.0 ** generator.uniform(-11.0, 0.0, 400))
+    for alpha in (0.05, 0.5, 0.9, 1.0):
+        zeros, marginal = unstable_zeros(characteristic(LinearPlant(0.0), c, k, alpha))
+        assert not marginal.any()
+        np.testing.assert_array_equal(zeros, 2.0)
+
+
+def test_blocks_count_as_they_do_alone(members: list[Loop]) -> None:
+    """Uncoupled planes of one loop, one of them with a zero close to the origin."""
+    some = members[:20]
+    orders = [0.9, 0.7]
+    planes = [(m.k_p - m.stiffness, m.k_d) for m in some]
+    damping = block_diag(some[0].damping, 0.0)
+    k_p, k_d = (np.array([block_diag(plane[i], (-1e-7, 1.0)[i]) for plane in planes]) for i in range(2))
+    zeros, _ = unstable_zeros(characteristic(LinearPlant(np.zeros((3, 3)), damping), k_p, k_d, [*orders, 0.8]))
+    alone = [poles.unstable_count(member.replace(alpha=orders)) for member in some]
+    np.testing.assert_array_equal(zeros, np.array(alone) + 1)
+
+
+def test_gains_that_only_some_entries_have() -> None:
+    """A batch of diagonal gains and one coupling for all: the diagonal differs from member to member."""
+    k_p, k_d = np.array([4.0, 3.5, 2.0]), np.array([2.0, -0.1, 0.5])
+    eye, gyroscopic = np.eye(2), np.array([[0.0, 2.0], [-2.0, 0.0]])
+    matrix = characteristic(HCWInPlane(), k_p[:, None, None] * eye, k_d[:, None, None] * eye, [0.9, 0.8])
+    zeros, _ = unstable_zeros(matrix)
+    alone = [
+        loops.in_plane(np.hstack([p * eye, d * eye]), [0.9, 0.8], np.zeros(4)) for p, d in zip(k_p, k_d, strict=True)
+    ]
+    assert np.array_equal(alone[0].damping, gyroscopic)
+    np.testing.assert_array_equal(zeros, [poles.unstable_count(member) for member in alone])
+
+
+def test_pole_radius_is_the_root_of_the_bound() -> None:
+    """|σ|² = k |σ|^α + c for one coordinate, to 2 % from above."""
+    generator = np.random.default_rng(4)
+    c, alpha = 10.0 ** generator.uniform(-2.0, 4.0, (2, 300)), 0.7
+    radius = pole_radius(characteristic(LinearPlant(0.0), c[0], c[1], alpha))
+    for bound, p, d in zip(radius, *c, strict=True):
+        exact = brentq(lambda r, p=p, d=d: r**2 - d * r**alpha - p, 1e-6, 1e6, rtol=1e-13)
+        assert exact < bound < 1.02 * exact
 
 
 def test_pole_radius_holds_all_poles(members: list[Loop]) -> None:

@@ -84,6 +84,20 @@ def test_verdicts_and_growing_solutions(solver: BatchSolver) -> None:
 
 
 @EITHER
+def test_a_batch_of_diagonal_gains(solver: BatchSolver) -> None:
+    """Some entries of the matrix differ from member to member, others are those of the plant for all."""
+    k_p, k_d = (
+        np.array([4.0, 5.0, 4.5])[:, None, None] * np.eye(2),
+        np.array([2.0, 1.5, 2.5])[:, None, None] * np.eye(2),
+    )
+    start, times = np.array([1e-3, -2e-3, 5e-4, 2e-3]), np.linspace(0.0, 5.0, 11)
+    together = solver.solve(ClosedLoop(HCWInPlane(), PDAlpha(k_p, k_d, [0.9, 0.8])), start, 5.0)(times)
+    for i in range(3):
+        alone = solver.solve(ClosedLoop(HCWInPlane(), PDAlpha(k_p[i], k_d[i], [0.9, 0.8])), start, 5.0)(times)
+        np.testing.assert_allclose(together[i], alone, atol=2e-8 * np.abs(alone).max())
+
+
+@EITHER
 def test_the_whole_state_is_its_two_planes(solver: BatchSolver) -> None:
     """Uncoupled coordinates are solved apart and come out as they do alone."""
     k_p, k_d = np.diag([4.0, 0.4, 0.85]), np.diag([2.4, 1.95, 2.0])

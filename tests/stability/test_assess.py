@@ -87,6 +87,8 @@ def test_free_motion_is_marginal(plant: LinearPlant, alpha: float) -> None:
         (0.5, 1e-6, True),
         (-1.0 + 1e-9, 1.0, True),
         (-1.0 - 1e-9, 1.0, False),
+        (-1.0 + 1e-12, -1e-7, False),
+        (-1.0 + 1e-12, 1e-7, True),
     ],
 )
 @pytest.mark.parametrize("alpha", [1.0, 0.8])

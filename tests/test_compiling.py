@@ -1,0 +1,20 @@
+"""Kernels compile where nothing can be written, too."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numba.core import caching
+
+from fracctl.compiling import compiled
+
+
+def test_without_a_writable_directory_kernels_are_compiled_all_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(caching.CompileResultCacheImpl, "_locator_classes", [])
+
+    @compiled
+    def total(values: np.ndarray) -> float:
+        result: float = values.sum()
+        return result
+
+    assert total(np.array([1.0, 2.0])) == 3.0
