@@ -123,8 +123,32 @@ class PanelGrid:
             self.times[self.offsets[i]], self.times[self.offsets[i + 1] - 1] = panel.start, panel.end
 
     @cached_property
-    def _integrals(self) -> list[Floats]:
-        return [self.rates[where, None] * rule.integral for where, _, rule in self.slices()]
+    def nodes(self) -> Floats:
+        """y and barycentric weights, (2, T)."""
+        return np.stack([self.y, self.weights])
+
+    @cached_property
+    def slopes(self) -> Floats:
+        """Rows that take the values of a panel, in their first columns, to d/dy at its nodes, (T, n)."""
+        return self._rows([rule.slope for rule in self.rules])
+
+    @cached_property
+    def integrals(self) -> Floats:
+        """Rows that take the values of a panel to their integrals over time from its start to its nodes, (T, n)."""
+        return self._rows([self.rates[where, None] * rule.integral for where, _, rule in self.slices()])
+
+    @cached_property
+    def clock(self) -> Floats:
+        """Start, dt/dy or, of logarithmic panels, d ln t/dy, and 1 for those and 0 for linear ones, (P, 3)."""
+        spans = [np.log(p.end / p.start) if p.logarithmic else p.end - p.start for p in self.panels]
+        return np.array([(p.start, 0.5 * span, p.logarithmic) for p, span in zip(self.panels, spans, strict=True)])
+
+    def _rows(self, matrices: list[Floats]) -> Floats:
+        """Matrices to be applied from the right, one a panel, as the rows of their columns."""
+        rows = np.zeros((len(self.y), max(panel.nodes for panel in self.panels)))
+        for (where, panel, _), matrix in zip(self.slices(), matrices, strict=True):
+            rows[where, : panel.nodes] = matrix.T
+        return rows
 
     @property
     def horizon(self) -> float:
@@ -136,25 +160,12 @@ class PanelGrid:
         for i, (panel, rule) in enumerate(zip(self.panels, self.rules, strict=True)):
             yield slice(int(self.offsets[i]), int(self.offsets[i + 1])), panel, rule
 
-    def slope(self, values: Floats) -> Floats:
-        """Return d/dy of values (…, T) at the nodes."""
-        return self._mapped(values, [rule.slope for rule in self.rules])
-
     def derivative(self, values: Floats) -> Floats:
         """Return d/dt of values (…, T) at the nodes."""
-        return self.slope(values) / self.rates
-
-    def integral(self, values: Floats) -> Floats:
-        """Return the integrals over time from the start of each panel to its nodes, (…, T)."""
-        return self._mapped(values, self._integrals)
-
-    def _mapped(self, values: Floats, matrices: list[Floats]) -> Floats:
-        """Apply one square matrix a panel, in products of all members at once."""
-        flat = values.reshape(-1, values.shape[-1])
-        out = np.empty_like(flat)
-        for (where, _, _), matrix in zip(self.slices(), matrices, strict=True):
-            np.matmul(flat[:, where], matrix, out=out[:, where])
-        return out.reshape(values.shape)
+        out = np.empty_like(values)
+        for where, _, rule in self.slices():
+            out[..., where] = values[..., where] @ rule.slope
+        return out / self.rates
 
     def evaluate(self, values: Floats, times: Floats) -> Floats:
         """Return values (…, T) interpolated at times (t,); before the first node the first value."""
@@ -175,11 +186,3 @@ class PanelGrid:
             mine = panels == i
             y[mine] = np.clip(panel.y(np.maximum(times[mine], panel.start)), -1.0, 1.0)
         return panels, y
-
-    def time_at(self, panels: Array, y: Floats) -> Floats:
-        """Return the time of scattered points."""
-        out = np.empty(len(y))
-        for i, panel in enumerate(self.panels):
-            mine = panels == i
-            out[mine] = panel.time(y[mine])
-        return out

@@ -1,119 +1,103 @@
-"""Roots and extrema of one polynomial on Chebyshev nodes, compiled.
+"""Values, slopes, roots and extrema of the polynomials on the panels of one member, compiled.
 
-A polynomial is given by its values at the nodes first … stop - 1 of a node axis; y and the barycentric weights are
-those of the whole axis.
+`nodes` holds y and the barycentric weights of all nodes of a grid, (2, T), and `row` the values of one function
+there; `first` is the first node of a panel and `stop` the node after its last. Sums run over unsigned indices,
+which cannot count from the end: with others the compiler does not vectorise them.
 """
 
 from __future__ import annotations
+
+from functools import partial
 
 import numba
 import numpy as np
 
 from fracctl.arrays import Floats
 
-compiled = numba.njit(cache=True, error_model="numpy")
-_summing = numba.njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract"})
+_inner = partial(numba.njit, cache=True, error_model="numpy", _nrt=False)
+"""Of functions that make no arrays: without counting references to those they are given they take 2/3 of the time."""
+
+over_rows = numba.njit(cache=True, error_model="numpy")
+compiled = _inner()
+summing = _inner(forceinline=True, fastmath={"reassoc", "contract"})
+comparing = _inner(forceinline=True, fastmath={"reassoc", "nnan", "nsz"})
+
+SWELL = 1.5
+"""No interpolant that its nodes resolve is larger between them than this times its largest node."""
+
+_INSIDE = 1e-5
+"""How far from a node, relative to the distance of the nodes, `taylor` still gives curvatures to five digits."""
 
 
-@_summing
-def at(y: Floats, weights: Floats, values: Floats, first: int, stop: int, point: float) -> float:
-    """Value at `point` of the polynomial through the nodes first … stop - 1 (barycentric form)."""
+def as_rows(values: Floats) -> Floats:
+    """All functions as rows (r, T), without a copy where they lie so in memory."""
+    return np.ascontiguousarray(values).reshape(-1, values.shape[-1])
+
+
+@summing
+def at(nodes: Floats, row: Floats, first: int, stop: int, point: float) -> float:
+    """Value at `point` (barycentric form)."""
     above, below = 0.0, 0.0
-    for j in range(first, stop):
-        share = weights[j] / (point - y[j])
-        above += share * values[j]
+    for j in range(np.uint64(first), np.uint64(stop)):
+        share = nodes[1, j] / (point - nodes[0, j])
+        above += share * row[j]
         below += share
     value: float = above / below
     if value != value:
         for j in range(first, stop):
-            if point == y[j]:
-                value = values[j]
+            if point == nodes[0, j]:
+                value = row[j]
     return value
 
 
-@compiled
-def _cubic(u: float, f0: float, f1: float, d0: float, d1: float) -> tuple[float, float]:
-    """Value and derivative at u in [0, 1] of the cubic with values f0, f1 and derivatives d0, d1 at the ends."""
-    a, b = d0 - (f1 - f0), (f1 - f0) - d1
-    v = 1.0 - u
-    value: float = v * f0 + u * f1 + u * v * (v * a + u * b)
-    return value, f1 - f0 + (v - u) * (v * a + u * b) + u * v * (b - a)
+@summing
+def taylor(nodes: Floats, row: Floats, first: int, stop: int, point: float) -> tuple[float, float, float]:
+    """Value and the first two derivatives at a point away from the nodes.
 
-
-@compiled
-def _cubic_root(f0: float, f1: float, d0: float, d1: float) -> tuple[float, float]:
-    """A root in [0, 1] of the cubic, whose ends have opposite signs, and its derivative there."""
-    low, high = 0.0, 1.0
-    u: float = f0 / (f0 - f1)
-    value, slope = _cubic(u, f0, f1, d0, d1)
-    for _ in range(40):
-        if (value > 0.0) == (f0 > 0.0):
-            low = u
-        else:
-            high = u
-        following = u - value / slope if slope != 0.0 else low
-        if not low <= following <= high:
-            following = 0.5 * (low + high)
-        moved = abs(following - u)
-        u = following
-        value, slope = _cubic(u, f0, f1, d0, d1)
-        if moved < 1e-4:
-            break
-    return u, slope
-
-
-@compiled
-def node_root(
-    y: Floats, weights: Floats, row: Floats, slope: Floats, first: int, stop: int, j: int, level: float, near: float
-) -> float:
-    """A root of the polynomial minus `level` between the nodes j and j + 1, where it changes sign.
-
-    The cubic of values and slopes at both nodes gives a start, secant steps end once they are shorter than `near`
-    times the distance of the nodes, which leaves an error far below that; Ridders' method is the fallback.
+    With s_k = Σ w_j / (y - y_j)^k and f_k the same sums over w_j f_j, the barycentric form p = f_1 / s_1 gives
+    p' = (p s_2 - f_2) / s_1 and p'' = 2 (f_3 - p s_3 + p' s_2) / s_1.
     """
-    width = y[j + 1] - y[j]
-    f0, f1 = row[j] - level, row[j + 1] - level
-    u, tangent = _cubic_root(f0, f1, slope[j] * width, slope[j + 1] * width)
-    before, f_before = u, 0.0
-    for attempt in range(8):
-        f = at(y, weights, row, first, stop, y[j] + u * width) - level
-        if attempt > 0 and f != f_before:
-            tangent = (f - f_before) / (u - before)
-        if tangent == 0.0 or not 0.0 <= u - f / tangent <= 1.0:
-            break
-        before, f_before, u = u, f, u - f / tangent
-        if abs(u - before) < near:
-            point: float = y[j] + u * width
-            return point
-    return bracketed_root(y, weights, row, first, stop, y[j], y[j + 1], f0, f1, level)
+    s1, s2, s3, f1, f2, f3 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for j in range(np.uint64(first), np.uint64(stop)):
+        inverse = 1.0 / (point - nodes[0, j])
+        a = nodes[1, j] * inverse
+        b = a * inverse
+        c = b * inverse
+        s1 += a
+        s2 += b
+        s3 += c
+        f1 += a * row[j]
+        f2 += b * row[j]
+        f3 += c * row[j]
+    value = f1 / s1
+    slope = (value * s2 - f2) / s1
+    return value, slope, 2.0 * (f3 - value * s3 + slope * s2) / s1
+
+
+@summing
+def weighted(matrix: Floats, i: int, row: Floats, first: int, stop: int) -> float:
+    """Sum of the values of a panel times the first entries of row i of a matrix."""
+    total, offset = 0.0, np.uint64(first)
+    for j in range(np.uint64(stop - first)):
+        total += matrix[i, j] * row[offset + j]
+    return total
+
+
+@comparing
+def extremes(row: Floats, first: int, stop: int) -> tuple[float, float]:
+    """Smallest and largest value at the nodes of a panel."""
+    low, high = row[first], row[first]
+    for j in range(np.uint64(first), np.uint64(stop)):
+        value = row[j]
+        low = value if value < low else low
+        high = value if value > high else high
+    return low, high
 
 
 @compiled
-def peak(y: Floats, weights: Floats, row: Floats, slope: Floats, first: int, stop: int, j: int) -> tuple[float, float]:
-    """Where the slope vanishes between the nodes j and j + 1, and the value there."""
-    width = y[j + 1] - y[j]
-    scale = abs(slope[j]) + abs(slope[j + 1])
-    point = y[j] + width * abs(slope[j]) / scale if scale > 0.0 else y[j]
-    before, f_before = y[j], slope[j]
-    for _ in range(6):
-        f = at(y, weights, slope, first, stop, point)
-        if f == f_before:
-            break
-        following = point - f * (point - before) / (f - f_before)
-        if not y[j] <= following <= y[j + 1]:
-            point = bracketed_root(y, weights, slope, first, stop, y[j], y[j + 1], slope[j], slope[j + 1], 0.0)
-            break
-        before, f_before, point = point, f, following
-        if abs(point - before) < 1e-3 * width:
-            break
-    return point, at(y, weights, row, first, stop, point)
-
-
-@compiled
-def bracketed_root(
-    y: Floats,
-    weights: Floats,
-    values: Floats,
+def root(
+    nodes: Floats,
+    row: Floats,
     first: int,
     stop: int,
     low: float,
@@ -121,30 +105,81 @@ def bracketed_root(
     f_low: float,
     f_high: float,
     level: float,
+    near: float,
 ) -> float:
-    """A root of the polynomial minus `level` between low and high, where it is f_low and f_high (Ridders' method)."""
+    """A root of the polynomial minus `level` between low and high, where it is f_low and f_high, of opposite signs.
+
+    low < high lie in one interval between two nodes. Halley's steps begin at the secant, with bisection where they
+    leave the bracket. With q = f'' / (2 f') a step s leaves an error near s³ (q² - f''' / (6 f')), of which the second
+    term is below (high - low)^-2 where the nodes resolve f; what leaves less than near (high - low) is the last step.
+    """
     if f_low == 0.0:
         return low
-    point: float = high
+    width = high - low
+    left, right, margin = low, high, _INSIDE * width
+    point: float = low + width * f_low / (f_low - f_high)
     for _ in range(60):
-        middle: float = 0.5 * (low + high)
-        f_middle = at(y, weights, values, first, stop, middle) - level
-        scale = np.sqrt(f_middle * f_middle - f_low * f_high)
-        if scale == 0.0:
-            return middle
-        following: float = middle + (middle - low) * (1.0 if f_low > f_high else -1.0) * f_middle / scale
-        f = at(y, weights, values, first, stop, following) - level
-        if f == 0.0 or abs(following - point) < 1e-13:
-            return following
-        point = following
-        if (f_middle > 0.0) != (f > 0.0):
-            low, f_low, high, f_high = middle, f_middle, following, f
-            if low > high:
-                low, f_low, high, f_high = high, f_high, low, f_low
-        elif (f_low > 0.0) != (f > 0.0):
-            high, f_high = following, f
+        point = min(max(point, low + margin), high - margin)
+        value, slope, curvature = taylor(nodes, row, first, stop, point)
+        value -= level
+        if (value > 0.0) == (f_low > 0.0):
+            left = point
         else:
-            low, f_low = following, f
-        if high - low < 1e-13:
-            return point
+            right = point
+        following = point - 2.0 * value * slope / (2.0 * slope * slope - value * curvature)
+        if left - margin <= following <= right + margin:
+            following = min(max(following, left), right)
+            bend = 0.5 * curvature * width / slope
+            if (abs(following - point) / width) ** 3 * (1.0 + bend * bend) < near:
+                return following
+            point = following
+        else:
+            point = 0.5 * (left + right)
+            if right - left < margin:
+                break
     return point
+
+
+@compiled
+def peak(nodes: Floats, row: Floats, first: int, stop: int, i: int, k: int, slope: float) -> tuple[float, float]:
+    """Where the polynomial, which leaves the node i with `slope`, turns before the neighbour k, and its value there.
+
+    It turns since its value at k is no further out than at i. Newton's steps on the slope begin at the vertex of the
+    parabola of both values and the slope, with bisection where they leave the bracket.
+    """
+    origin, width = nodes[0, i], nodes[0, k] - nodes[0, i]
+    rise = slope * width
+    if rise == 0.0:
+        return origin, row[i]
+    left, right = 0.0, 1.0
+    u: float = 0.5 * rise / (rise + row[i] - row[k])
+    value = row[i]
+    for _ in range(60):
+        u = min(max(u, _INSIDE), 1.0 - _INSIDE)
+        value, slope, curvature = taylor(nodes, row, first, stop, origin + u * width)
+        step = -slope / (curvature * width)
+        if abs(step) < 2e-4:
+            return origin + (u + step) * width, value + 0.5 * slope * step * width
+        if (slope * width > 0.0) == (rise > 0.0):
+            left = u
+        else:
+            right = u
+        if right - left < _INSIDE:
+            break
+        u = u + step if left < u + step < right else 0.5 * (left + right)
+    return origin + u * width, value
+
+
+@compiled
+def time_at(clock: Floats, panel: int, y: float) -> float:
+    """Time at y in a panel."""
+    start, passed = clock[panel, 0], clock[panel, 1] * (y + 1.0)
+    time: float = start * np.exp(passed) if clock[panel, 2] else start + passed
+    return time
+
+
+@compiled
+def rate_at(clock: Floats, panel: int, y: float) -> float:
+    """dt/dy at y in a panel."""
+    scale: float = clock[panel, 1]
+    return scale * time_at(clock, panel, y) if clock[panel, 2] else scale

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -56,10 +55,10 @@ class Trajectory:
         """Whether a member has no trajectory, (b,)."""
         return np.isnan(self.positions[:, 0, -1])
 
-    @cached_property
-    def slopes(self) -> Floats:
-        """dξ/dy at the nodes in the variable y of the panels, (b, m, T), for the search of extrema."""
-        return self.grid.slope(self.positions)
+    @property
+    def by_component(self) -> Floats:
+        """ξ at the nodes, (m, b, T), as most solvers have it in memory."""
+        return np.swapaxes(self.positions, 0, 1)
 
     @property
     def times(self) -> Floats:

@@ -39,7 +39,7 @@ def test_a_hump_between_two_nodes_is_the_last_crossing(sign: float) -> None:
     centre, width, level = left + 0.4 * (right - left), 0.1 * (right - left), 1.0
     values = sign * (level * np.cos(5.0 * (grid.times - centre)) / np.cos(5.0 * width))[None]
     assert (np.abs(values) < level).all()
-    crossing = last_crossing(grid, values, grid.slope(values), level)[0]
+    crossing = last_crossing(grid, values, level)[0]
     assert crossing == pytest.approx(centre + width, abs=1e-10)
 
 
@@ -49,20 +49,100 @@ def test_the_largest_excursion_is_exact_between_nodes(side: float) -> None:
     top = np.arctan2(1.3, 0.2) / 1.3
     second = top + np.pi / 1.3
     heights = [np.exp(-0.2 * t) * abs(np.sin(1.3 * t)) for t in (top, second)]
-    slopes = GRID.slope(values)
     for chosen, height in ((side, heights[0]), (-side, heights[1]), (0.0, heights[0])):
-        found = largest_excursion(GRID, values, slopes, np.array([chosen]), with_end=False)
+        found = largest_excursion(GRID, values, np.array([chosen]), with_end=False)
         assert found[0] == pytest.approx(height, rel=1e-10)
 
 
 def test_the_last_crossing_is_exact_between_nodes() -> None:
     values = np.exp(-GRID.times)[None]
-    slopes = GRID.slope(values)
-    assert last_crossing(GRID, values, slopes, 0.05)[0] == pytest.approx(np.log(20.0), abs=1e-10)
-    assert last_crossing(GRID, values, slopes, 1e-4)[0] == np.inf
-    assert last_crossing(GRID, values, slopes, 2.0)[0] == 0.0
+    assert last_crossing(GRID, values, 0.05)[0] == pytest.approx(np.log(20.0), abs=1e-10)
+    assert last_crossing(GRID, values, 1e-4)[0] == np.inf
+    assert last_crossing(GRID, values, 2.0)[0] == 0.0
 
 
 def test_changes_of_sign_are_located_in_the_integral() -> None:
     values = np.sin(GRID.times)[None]
     assert absolute_integral(GRID, values)[0] == pytest.approx(5.0 - np.cos(7.0), rel=1e-10)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("shift", [-1e-2, -1e-4, -1e-9, 0.0, 1e-9, 1e-4, 1e-2])
+def test_an_extremum_next_to_the_end_of_a_panel(shift: float, sign: float) -> None:
+    """cos(t - 1 - shift), with a maximum next to the boundary at 1, a minimum at 4.1 and changes of sign between."""
+    values = sign * np.cos(GRID.times - 1.0 - shift)[None]
+    for side in (sign, -sign):
+        assert largest_excursion(GRID, values, np.array([side]), with_end=False)[0] == pytest.approx(1.0, abs=1e-10)
+    exact = np.sin(1.0 + shift) + 4.0 + np.sin(6.0 - shift) + 1.0 - 1.0
+    assert absolute_integral(GRID, values)[0] == pytest.approx(exact, rel=1e-8)
+
+
+@pytest.mark.parametrize("node", [LEFT, 24, 47, 48, 71])
+def test_features_at_a_node(node: int) -> None:
+    """A maximum, a double zero, a change of sign and a crossing exactly at a node, the ends of panels among them."""
+    time = GRID.times[node]
+    hill = 1.0 - ((GRID.times - time)[None] / 7.0) ** 2
+    assert largest_excursion(GRID, hill, np.ones(1), with_end=time == 7.0)[0] == pytest.approx(1.0, abs=1e-12)
+    assert absolute_integral(GRID, 1.0 - hill)[0] == pytest.approx((time**3 + (7.0 - time) ** 3) / 147.0, rel=1e-8)
+    line = (GRID.times - time)[None]
+    assert absolute_integral(GRID, line)[0] == pytest.approx(0.5 * (time**2 + (7.0 - time) ** 2), rel=1e-8)
+    assert last_crossing(GRID, 8.0 - GRID.times[None], 8.0 - time)[0] == pytest.approx(time, abs=1e-12)
+
+
+def test_a_maximum_hidden_on_the_way_down_is_found() -> None:
+    """t³/3 - ε² t falls at every node, yet rises by 4ε³/3 between two extrema less than two nodes apart."""
+    grid = PanelGrid([Panel(0.0, 1.0, 40), Panel(1.0, 7.0, 40)])
+    node = int(np.flatnonzero(grid.times > 4.0)[0])
+    gap, centre = grid.times[node + 1] - grid.times[node], grid.times[node]
+    for epsilon in (0.3 * gap, 0.1 * gap):
+        values = -(((grid.times - centre) ** 3) / 3.0 - epsilon**2 * (grid.times - centre))[None]
+        assert (np.diff(values[0]) <= 0.0).all()
+        found = largest_excursion(grid, values + 1.0, np.array([1.0]), with_end=False)[0]
+        assert found == pytest.approx(1.0 + 2.0 * epsilon**3 / 3.0, abs=1e-10)
+
+
+def test_flat_rounding_is_no_maximum() -> None:
+    values = (1.0 - 0.1 * GRID.times**2 / (1.0 + GRID.times**2))[None]
+    noise = np.random.default_rng(3).uniform(-1e-13, 1e-13, values.shape)
+    assert largest_excursion(GRID, values + noise, np.array([0.0]), with_end=False)[0] == 0.0
+    assert largest_excursion(GRID, np.ones_like(values), np.array([0.0]), with_end=False)[0] == 0.0
+
+
+def test_start_and_end_on_the_band() -> None:
+    falls = np.exp(-GRID.times)[None]
+    assert last_crossing(GRID, falls, falls[0, 0])[0] == 0.0
+    assert last_crossing(GRID, falls, falls[0, -1])[0] == pytest.approx(7.0, abs=1e-12)
+    assert last_crossing(GRID, np.ones_like(falls), 1.0)[0] == 0.0
+    assert absolute_integral(GRID, np.zeros_like(falls))[0] == 0.0
+
+
+def test_members_do_not_see_each_other() -> None:
+    phases = np.linspace(0.0, 6.0, 30)
+    values = np.exp(-0.5 * GRID.times) * np.sin(3.0 * GRID.times + phases[:, None])
+    side = np.zeros(30)
+    whole = (
+        last_crossing(GRID, values, 0.05),
+        largest_excursion(GRID, values, side, with_end=False),
+        absolute_integral(GRID, values),
+    )
+    part = slice(7, 12)
+    for all_members, some in zip(
+        whole,
+        (
+            last_crossing(GRID, values[part], 0.05),
+            largest_excursion(GRID, values[part], side[part], with_end=False),
+            absolute_integral(GRID, values[part]),
+        ),
+        strict=True,
+    ):
+        np.testing.assert_array_equal(all_members[part], some)
+
+
+def test_missing_values_are_infinite() -> None:
+    values = np.full((1, len(GRID.times)), np.nan)
+    for measured in (
+        last_crossing(GRID, values, 0.1),
+        largest_excursion(GRID, values, np.zeros(1), with_end=True),
+        absolute_integral(GRID, values),
+    ):
+        assert measured[0] == np.inf

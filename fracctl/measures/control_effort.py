@@ -36,23 +36,20 @@ class ControlEffort:
 
     def __call__(self, trajectory: Trajectory) -> dict[str, Floats]:
         """Return column ``control_effort``, (b,)."""
-        controls = trajectory.controls_at_nodes
-        blank = trajectory.missing
-        clean = np.where(blank[:, None, None], 0.0, controls) if blank.any() else controls
-        effort = self._exact(trajectory, clean) if self.resolution is None else self._sampled(trajectory, clean)
-        return {self.name: np.where(blank, np.inf, effort)}
+        return {self.name: self._exact(trajectory) if self.resolution is None else self._sampled(trajectory)}
 
-    def _exact(self, trajectory: Trajectory, controls: Floats) -> Floats:
-        total = sum(absolute_integral(trajectory.grid, controls[:, i]) for i in range(controls.shape[1]))
-        first: Floats = np.abs(controls[:, :, 0]).sum(axis=1) * trajectory.grid.panels[0].start
-        return total + first
+    def _exact(self, trajectory: Trajectory) -> Floats:
+        controls, grid = trajectory.controls_at_nodes, trajectory.grid
+        first = np.abs(controls[:, :, 0]) * grid.panels[0].start
+        effort: Floats = (absolute_integral(grid, controls) + first).sum(axis=1)
+        return effort
 
-    def _sampled(self, trajectory: Trajectory, controls: Floats) -> Floats:
+    def _sampled(self, trajectory: Trajectory) -> Floats:
         assert self.resolution is not None
         samples, initial = Samples(trajectory.grid, self.resolution), trajectory.initial_controls
+        controls = np.where(trajectory.missing[:, None, None], 0.0, trajectory.controls_at_nodes)
         components = [samples.absolute_integral(controls[:, i], initial[:, i]) for i in range(controls.shape[1])]
-        effort: Floats = np.sum(components, axis=0)
-        return effort
+        return np.where(trajectory.missing, np.inf, np.sum(components, axis=0))
 
 
 def control_effort(trajectory: Trajectory, resolution: float | None = None) -> Floats | float:

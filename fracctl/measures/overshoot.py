@@ -43,20 +43,24 @@ class Overshoot:
 
     def __call__(self, trajectory: Trajectory) -> dict[str, Floats]:
         """Return column ``overshoot``, (b,)."""
-        m = trajectory.positions.shape[1]
-        samples = None if self.resolution is None else Samples(trajectory.grid, self.resolution)
-        total = sum(self._component(trajectory, i, samples) for i in range(m))
-        overshoot = 1.0 + self.scale * total / m
-        overshoot[trajectory.missing] = np.inf
-        return {self.name: overshoot}
-
-    def _component(self, trajectory: Trajectory, component: int, samples: Samples | None) -> Floats:
-        values, start = trajectory.positions[:, component], trajectory.initial_state[:, component]
+        start = trajectory.initial_state[:, : trajectory.positions.shape[1]].T
         past = self.definition == "past_equilibrium"
-        side = -np.sign(start) if past else np.zeros(len(values))
-        if samples is None:
-            return largest_excursion(trajectory.grid, values, trajectory.slopes[:, component], side, with_end=past)
-        return samples.largest_excursion(values, start, side) if past else samples.largest_extremum(values, start)
+        side = -np.sign(start) if past else np.zeros_like(start)
+        if self.resolution is None:
+            largest = largest_excursion(trajectory.grid, trajectory.by_component, side, with_end=past)
+        else:
+            largest = self._sampled(trajectory, start, side)
+        return {self.name: 1.0 + self.scale * largest.mean(axis=0)}
+
+    def _sampled(self, trajectory: Trajectory, start: Floats, side: Floats) -> Floats:
+        """Return the largest samples, (m, b); +inf where there is no trajectory."""
+        assert self.resolution is not None
+        samples, past = Samples(trajectory.grid, self.resolution), self.definition == "past_equilibrium"
+        largest = np.empty_like(start)
+        for i, values in enumerate(trajectory.by_component):
+            whole = samples.largest_excursion(values, start[i], side[i])
+            largest[i] = whole if past else samples.largest_extremum(values, start[i])
+        return np.where(trajectory.missing, np.inf, largest)
 
 
 def overshoot(

@@ -23,10 +23,10 @@ class PeakAcceleration:
         """Return column ``peak_acceleration``, (b,)."""
         blank = trajectory.missing
         controls = np.where(blank[:, None, None], 0.0, trajectory.controls_at_nodes)
-        slopes, either = trajectory.grid.slope(controls), np.zeros(len(controls))
+        either = np.zeros(len(controls))
         peak = np.abs([trajectory.initial_controls, controls[:, :, 0]]).max(axis=(0, 2))
         for i in range(controls.shape[1]):
-            within = largest_excursion(trajectory.grid, controls[:, i], slopes[:, i], either, with_end=True)
+            within = largest_excursion(trajectory.grid, controls[:, i], either, with_end=True)
             peak = np.maximum(peak, within)
         return {self.name: np.where(blank, np.inf, peak)}
 

@@ -33,12 +33,7 @@ class SettlingTime:
 
     def __call__(self, trajectory: Trajectory) -> dict[str, Floats]:
         """Return column ``settling_time``, (b,)."""
-        grid, positions, slopes = trajectory.grid, trajectory.positions, trajectory.slopes
-        components = [
-            last_crossing(grid, positions[:, i], slopes[:, i], self.threshold) for i in range(positions.shape[1])
-        ]
-        exact: Floats = np.max(components, axis=0)
-        exact[trajectory.missing] = np.inf
+        exact: Floats = last_crossing(trajectory.grid, trajectory.by_component, self.threshold).max(axis=0)
         if self.resolution is None:
             return {self.name: exact}
         return {self.name: self._sampled(trajectory, exact)}
