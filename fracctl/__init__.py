@@ -13,16 +13,27 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from fracctl import controllers, measures, plants, solvers, stability
+    from fracctl import controllers, design, measures, plants, solvers, stability
     from fracctl.execution.library import run
     from fracctl.loop import ClosedLoop
     from fracctl.solvers import solve
 
     __version__: str
 
-__all__ = ["ClosedLoop", "__version__", "controllers", "measures", "plants", "run", "solve", "solvers", "stability"]
+__all__ = [
+    "ClosedLoop",
+    "__version__",
+    "controllers",
+    "design",
+    "measures",
+    "plants",
+    "run",
+    "solve",
+    "solvers",
+    "stability",
+]
 
-_ROOMS = ("controllers", "measures", "plants", "solvers", "stability")
+_ROOMS = ("controllers", "design", "measures", "plants", "solvers", "stability")
 _OBJECTS = {"ClosedLoop": "fracctl.loop", "run": "fracctl.execution.library", "solve": "fracctl.solvers"}
 
 

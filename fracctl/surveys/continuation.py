@@ -18,6 +18,9 @@ from fracctl.surveys.lqr_seed import LQRWeights, starting_point
 from fracctl.surveys.optima import Rank, ranks
 from fracctl.surveys.pattern_search import PatternSearch
 
+MOST_POINTS = 10_000
+"""More combinations of the axes' values than this are taken for a mistyped step."""
+
 _Place = tuple[int, ...]
 """Numbers of values, one an axis."""
 _Fronts = list[list[tuple[_Place, _Place]]]
@@ -205,11 +208,15 @@ def _checked_axes(evaluation: Evaluation, axes: Mapping[str, Any], start: Mappin
         outside = [value for value in values[name].tolist() if not parameters[name].contains(value)]
         if outside:
             raise ArgumentError(f"axes.{name}", outside[0], f"{parameters[name].allowed}, but holds {outside[0]:g}")
-        if start.get(name) not in values[name].tolist():
-            raise ArgumentError("start", dict(start), f"must hold one of the values of {name}")
-    for name in start:
+        if name not in start:
+            raise ArgumentError("start", dict(start), f"must hold a value of {name}, for it is an axis")
+        if start[name] not in values[name].tolist():
+            raise ArgumentError(f"start.{name}", start[name], "must be one of the values of its axis")
+    for name, value in start.items():
         if name not in axes:
-            raise ArgumentError("start", dict(start), f"must name axes ({', '.join(axes)}), but names {name}")
+            raise ArgumentError(f"start.{name}", value, f"must name an axis ({', '.join(axes)})")
+    if (points := math.prod(map(len, values.values()))) > MOST_POINTS:
+        raise ArgumentError("axes", dict(axes), f"must make at most {MOST_POINTS} points, but make {points}")
     return values
 
 

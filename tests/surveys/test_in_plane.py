@@ -66,6 +66,13 @@ def test_it_continues_where_it_stopped(tmp_path: Path, undisturbed: RunResult, a
     assert tables_of(found.run_directory) == tables_of(undisturbed.run_directory)
 
 
+def test_rows_of_paths_are_checked_by_a_second_solver(tmp_path: Path) -> None:
+    found = run(tmp_path, "scheduler=serial", "survey.axes.alpha_u=1.0", "solver.cross_check=0.3")
+    check = found.summary["cross_check"]
+    assert check["rows"] > len(found.optima) + 5
+    assert check["disagreements"] == 0
+
+
 @pytest.mark.slow
 def test_the_papers_survey(tmp_path: Path) -> None:
     """√(ST·OS) from IC1 over 121 pairs of orders: 4.966 for PD, at most 3.67 at (0.99, 0.90), measured beforehand."""
