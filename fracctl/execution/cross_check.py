@@ -98,7 +98,7 @@ class CrossCheck:
         allowed = np.maximum(10.0 * self.evaluation.solver.tolerance, first.error_estimate + second.error_estimate)
         self.rows += len(difference)
         self.worst = max(self.worst, float(np.max(difference)))
-        for i in np.flatnonzero(~(difference <= allowed)):
+        for i in np.flatnonzero(~(difference <= allowed)).tolist():
             point = ", ".join(f"{name} = {float(values[i]):g}" for name, values in design.items())
             self.disagreements.append(
                 f"{conditions[i]}, {point}: {self.evaluation.solver.name} and {self._second.name} differ by"
