@@ -16,6 +16,8 @@ from fracctl.evaluation import COUNTERS
 from fracctl.execution.cross_check import CrossCheck
 from fracctl.execution.drawing import draw_figures
 from fracctl.execution.executors import make_executor, n_workers
+from fracctl.execution.poles import COLUMNS as POLE_COLUMNS
+from fracctl.execution.poles import Poles
 from fracctl.execution.progress import Progress
 from fracctl.execution.record import Record, run_log
 from fracctl.execution.row_store import RowStore, evaluations_schema
@@ -109,6 +111,7 @@ class Computation:
     def _compute(self) -> dict[str, Any]:
         store = self._evaluate()
         tally, optima, check, findings = self._tables(store)
+        poles = self._write_optima(optima)
         self._trajectories()
         found = results(self._evaluation, optima)
         notes = self._notes + notes_on(found, self._survey.baseline, tally)
@@ -123,7 +126,7 @@ class Computation:
             "run_id": self._directory.path.name,
             "run_directory": str(self._directory.path),
         }
-        return summarise(identity, store, found, notes) | check.summary()
+        return summarise(identity, store, found, notes) | check.summary() | poles.summary()
 
     def _evaluate(self) -> RowStore:
         store = RowStore(self._directory, self._evaluation, self._evaluations_schema)
@@ -161,9 +164,17 @@ class Computation:
             findings += evaluation.findings(rows)
         optima = selection.rows()
         check.add_optima(optima)
-        columns = ("kind", "slice", "objective_name", *table.names)
-        self._directory.write_optima(schema(columns, COUNTERS, self._metadata), optima)
         return tally, optima, check, findings
+
+    def _write_optima(self, optima: list[dict[str, Any]]) -> Poles:
+        """Complete the optima by their poles, and write both."""
+        poles = Poles(self._evaluation)
+        poles.add_to(optima)
+        columns = ("kind", "slice", "objective_name", *self._evaluations_schema.names, *POLE_COLUMNS)
+        self._directory.write_optima(schema(columns, COUNTERS, self._metadata), optima)
+        rows = poles.rows()
+        self._directory.write_poles(schema(tuple(rows), metadata=self._metadata), rows)
+        return poles
 
     def _trajectories(self) -> None:
         optima = self._directory.optima()

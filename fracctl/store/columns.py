@@ -14,9 +14,12 @@ from fracctl.surveys.base import EVALUATIONS_SPENT, POINT, SEARCHED_FOR
 REASON = "reason"
 """Why a row failed; null where it did not."""
 
-_TEXT = ("initial_condition", "status", REASON, "kind", "objective_name", "solver", SEARCHED_FOR)
-_WHOLE = (POINT, "run", EVALUATIONS_SPENT)
-_FLAGS = ("stable",)
+SIGMA, W = "sigma", "w"
+"""Words of `variable` in ``poles.parquet``: poles σ; eigenvalues w of the pseudo-state matrix, w^denominator = σ."""
+
+_TEXT = ("variable", "initial_condition", "status", REASON, "kind", "objective_name", "solver", SEARCHED_FOR)
+_WHOLE = (POINT, "run", EVALUATIONS_SPENT, "principal_poles", "denominator")
+_FLAGS = ("stable", "all_poles_found")
 _UNITS = {
     "seconds_per_trajectory": "s",
     "_m_per_s": "m/s",

@@ -28,6 +28,7 @@ class RunDirectory:
         self.path = Path(path).absolute()
         self.evaluations_path = self.path / "evaluations.parquet"
         self.optima_path = self.path / "optima.parquet"
+        self.poles_path = self.path / "poles.parquet"
         self.trajectories_path = self.path / "trajectories.parquet"
         self.figures = self.path / "figures"
         self.parts = self.path / manifest.PARTS
@@ -90,6 +91,10 @@ class RunDirectory:
         """Return the trajectories of the overall and baseline optima; `run` is their row of `optima`."""
         return tables.to_pandas(tables.read(self.trajectories_path))
 
+    def poles(self) -> pd.DataFrame:
+        """Return poles and pseudo-state eigenvalues of the overall and baseline optima; `run` is their row."""
+        return tables.to_pandas(tables.read(self.poles_path))
+
     def write_evaluations(self, schema: pa.Schema, parts: Iterable[pa.Table]) -> None:
         """Join the parts."""
         tables.write(self.evaluations_path, schema, parts)
@@ -97,6 +102,10 @@ class RunDirectory:
     def write_optima(self, schema: pa.Schema, optima: Iterable[Mapping[str, Any]]) -> None:
         """Write the optima, one mapping a row."""
         tables.write(self.optima_path, schema, [records_table(optima, schema)])
+
+    def write_poles(self, schema: pa.Schema, rows: Mapping[str, Array]) -> None:
+        """Write the poles."""
+        tables.write(self.poles_path, schema, [to_table(rows, schema)])
 
     def write_trajectories(self, schema: pa.Schema, rows: Mapping[str, Array]) -> None:
         """Write the trajectories."""

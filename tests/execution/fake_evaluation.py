@@ -13,6 +13,8 @@ from typing import Any
 
 import numpy as np
 
+from fracctl.controllers import PDAlpha
+from fracctl.loop import ClosedLoop
 from fracctl.plants import LinearPlant
 from fracctl.solvers import Contour
 
@@ -92,6 +94,9 @@ class FakeEvaluation:
 
     def findings(self, rows: Mapping[str, Any]) -> list[str]:
         return []
+
+    def loop(self, design: Mapping[str, float]) -> ClosedLoop:
+        return ClosedLoop(self.plant, PDAlpha(design["k_p_w"], design["k_d_w"], design["alpha_w"]))
 
     def solve(self, design: Mapping[str, float], initial_condition: str, horizon: float = 10.0) -> FakeTrajectory:
         return FakeTrajectory(design["alpha_w"])
