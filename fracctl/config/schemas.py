@@ -73,7 +73,14 @@ class LocalScheduler(Typed):
 class Figure(Typed):
     """One figure of the run."""
 
-    type: Literal["gain_contours", "trajectories", "objective_against_order", "order_contours", "work_precision"]
+    type: Literal[
+        "gain_contours",
+        "trajectories",
+        "objective_against_order",
+        "order_contours",
+        "pareto_fronts",
+        "work_precision",
+    ]
     objective: str | None = None
     """Whose optima are shown; None for the primary one."""
     initial_conditions: list[str] | None = None

@@ -11,7 +11,14 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from fracctl.errors import ConfigurationError, FracctlError, suggestion
-from fracctl.figures import gain_contours, objective_against_order, order_contours, trajectories, work_precision
+from fracctl.figures import (
+    gain_contours,
+    objective_against_order,
+    order_contours,
+    pareto_fronts,
+    trajectories,
+    work_precision,
+)
 from fracctl.figures.results import FigureError, Results, Selection, select
 from fracctl.figures.style import render, style
 from fracctl.store import RunDirectory
@@ -22,6 +29,7 @@ TYPES: Mapping[str, Callable[[Results, Selection], tuple[Figure, pd.DataFrame]]]
     "trajectories": trajectories.build,
     "objective_against_order": objective_against_order.build,
     "order_contours": order_contours.build,
+    "pareto_fronts": pareto_fronts.build,
     "work_precision": work_precision.build,
 }
 """Type in the configuration to the function that makes the figure and the table behind it."""

@@ -70,6 +70,14 @@ TINY_CONTINUATION = [
     "survey.steps=[0.5]",
     "scheduler=serial",
 ]
+SEARCHES = ("ic1_inplane_search", "ic1_inplane_pareto")
+TINY_SEARCH = [
+    "survey.bounds.gains=[0,4]",
+    "survey.population=50",
+    "survey.evaluations=100",
+    "survey.starts=1",
+    "scheduler=serial",
+]
 SINGLE = ("inplane_decoupled",)
 """Experiments of one design point, which have no budget."""
 
@@ -113,7 +121,16 @@ def test_a_continuation_runs_on_a_tiny_budget(name: str, tmp_path: Path) -> None
     assert {path.stem for path in (result.run_directory / "figures").glob("*.pdf")} == set(config.figures)
 
 
-@pytest.mark.parametrize("name", sorted({*EXPERIMENTS} - {*CONTINUATIONS}))
+@pytest.mark.parametrize("name", SEARCHES)
+def test_a_search_runs_on_a_tiny_budget(name: str, tmp_path: Path) -> None:
+    config = compose([f"experiment={name}", *TINY_SEARCH, f"output_dir={tmp_path}"])
+    result = execute(config)
+    assert result.summary["status"] == "finished"
+    assert result.summary["optimum"]["objective"] <= result.summary["baseline"]["objective"]
+    assert {path.stem for path in (result.run_directory / "figures").glob("*.pdf")} == set(config.figures)
+
+
+@pytest.mark.parametrize("name", sorted({*EXPERIMENTS} - {*CONTINUATIONS} - {*SEARCHES}))
 def test_an_experiment_runs_on_a_tiny_budget(name: str, tmp_path: Path) -> None:
     budget = [] if name in SINGLE else [*TINY, *TINY_SETTINGS.get(name, [])]
     config = compose([f"experiment={name}", *budget, f"output_dir={tmp_path}"])
