@@ -77,5 +77,7 @@ class ClosedLoop:
 
 
 def _pad(matrix: Floats, rows_before: int, rows_after: int, columns_after: int) -> Floats:
-    width = [(0, 0)] * (matrix.ndim - 2) + [(rows_before, rows_after), (0, columns_after)]
-    return np.pad(matrix, width)
+    rows, columns = matrix.shape[-2:]
+    padded = np.zeros((*matrix.shape[:-2], rows_before + rows + rows_after, columns + columns_after))
+    padded[..., rows_before : rows_before + rows, :columns] = matrix
+    return padded

@@ -9,15 +9,15 @@ from __future__ import annotations
 
 from functools import partial
 
-import numba
 import numpy as np
 
 from fracctl.arrays import Floats
+from fracctl.compiling import compiled_with
 
-_inner = partial(numba.njit, cache=True, error_model="numpy", _nrt=False)
+_inner = partial(compiled_with, error_model="numpy", _nrt=False)
 """Of functions that make no arrays: without counting references to those they are given they take 2/3 of the time."""
 
-over_rows = numba.njit(cache=True, error_model="numpy")
+over_rows = compiled_with(error_model="numpy")
 compiled = _inner()
 summing = _inner(forceinline=True, fastmath={"reassoc", "contract"})
 comparing = _inner(forceinline=True, fastmath={"reassoc", "nnan", "nsz"})

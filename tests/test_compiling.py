@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from numba.core import caching
@@ -18,3 +21,13 @@ def test_without_a_writable_directory_kernels_are_compiled_all_the_same(monkeypa
         return result
 
     assert total(np.array([1.0, 2.0])) == 3.0
+
+
+def test_the_package_works_where_no_kernel_can_be_stored() -> None:
+    """In a process of its own, where every kernel is compiled without a directory for it."""
+    code = """
+from numba.core import caching
+caching.CompileResultCacheImpl._locator_classes = []
+import fracctl.characteristic, fracctl.measures, fracctl.solvers.contour, fracctl.solvers.volterra
+"""
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=60.0)

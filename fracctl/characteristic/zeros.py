@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numba
 import numpy as np
 
 from fracctl.arrays import Array, Complexes, Floats
+from fracctl.compiling import compiled_with
 
 _LONGEST_STEP = 0.1
 _SHORTEST_STEP = 1e-9
@@ -34,7 +34,7 @@ class Terms(NamedTuple):
     """(K,)."""
 
 
-@numba.njit(cache=True)
+@compiled_with()
 def logarithmic_derivative(terms: Terms, z: complex) -> tuple[complex, complex]:
     """Return det M̃ and tr(M̃⁻¹ dM̃/dz) at σ = e^z; a huge second one where det M̃ = 0."""
     p = terms.size
@@ -52,7 +52,7 @@ def logarithmic_derivative(terms: Terms, z: complex) -> tuple[complex, complex]:
     return det, trace
 
 
-@numba.njit(cache=True)
+@compiled_with()
 def _eliminate(work: Complexes) -> complex:
     """Turn [A, B] into [I, A⁻¹B] in place; return det A, 0 where it stops at a pivot of 0."""
     p, det = len(work), 1.0 + 0.0j
@@ -76,7 +76,7 @@ def _eliminate(work: Complexes) -> complex:
     return det
 
 
-@numba.njit(cache=True)
+@compiled_with()
 def phase_change(terms: Terms, corners: Complexes) -> float:
     """Return the change of arg det M̃ along straight lines in z from corner to corner.
 
@@ -102,7 +102,7 @@ def phase_change(terms: Terms, corners: Complexes) -> float:
     return total
 
 
-@numba.njit(cache=True)
+@compiled_with()
 def search(terms: Terms, starts: Complexes, wanted: int, edge: float) -> Complexes:
     """Return up to `wanted` zeros with |Im z| < `edge`, each as often as it is one, with the conjugates.
 

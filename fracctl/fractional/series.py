@@ -10,11 +10,11 @@ from collections import Counter
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
-import numba
 import numpy as np
 from scipy.special import rgamma
 
 from fracctl.arrays import Array, Floats
+from fracctl.compiling import compiled_with
 from fracctl.errors import UnsupportedError
 from fracctl.fractional.system import LinearFractionalSystem
 
@@ -194,7 +194,7 @@ def _recipe(symbols: list[_Symbol], present: list[set[int]], highest: float) -> 
     )
 
 
-@numba.njit(cache=True)
+@compiled_with()
 def _apply(steps: Array, gains: Floats, coefficients: Floats) -> None:
     """Run the recursion on coefficients (E, p, k, b) with gains (entries, b), in place."""
     _, _, k, b = coefficients.shape

@@ -1,9 +1,25 @@
-"""Solvers: each says what it can solve and refuses the rest with the solver to use instead."""
+"""Solvers: each says what it can solve and refuses the rest with the solver to use instead.
+
+Their classes are loaded at first use.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 from fracctl.solvers.base import Solver, Survey
-from fracctl.solvers.collocation import Collocation
-from fracctl.solvers.contour import Contour
 from fracctl.solvers.solve import solve
-from fracctl.solvers.volterra import Volterra
+
+if TYPE_CHECKING:
+    from fracctl.solvers.collocation import Collocation
+    from fracctl.solvers.contour import Contour
+    from fracctl.solvers.volterra import Volterra
 
 __all__ = ["Collocation", "Contour", "Solver", "Survey", "Volterra", "solve"]
+
+
+def __getattr__(name: str) -> Any:
+    if name in __all__:
+        return getattr(import_module(f"fracctl.solvers.{name.lower()}"), name)
+    raise AttributeError(f"module 'fracctl.solvers' has no attribute '{name}'")

@@ -7,15 +7,15 @@ the workspace of one block stays in the cache.
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 
 from fracctl.arrays import Array, Floats
+from fracctl.compiling import compiled_with
 
 LANES = 64
 """Members of a block."""
 
-compiled = numba.njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz", "arcp"})
+compiled = compiled_with(error_model="numpy", fastmath={"reassoc", "contract", "nsz", "arcp"})
 
 
 def lanes(values: Floats, members: Array) -> Floats:

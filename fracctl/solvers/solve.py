@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
+from importlib import import_module
+
 from numpy.typing import ArrayLike
 
 from fracctl.errors import ArgumentError, suggestion
 from fracctl.loop import ClosedLoop
 from fracctl.solvers.batched import BatchSolver
-from fracctl.solvers.collocation import Collocation
-from fracctl.solvers.contour import Contour
-from fracctl.solvers.volterra import Volterra
 from fracctl.trajectory import Trajectory
 
-_SOLVERS: dict[str, type[Collocation | Contour | Volterra]] = {
-    solver.name: solver for solver in (Contour, Volterra, Collocation)
-}
+_SOLVERS = {"contour": "Contour", "volterra": "Volterra", "collocation": "Collocation"}
+"""Class in the module of the name, which is loaded at first use."""
 
 
 def make_solver(name: str, tolerance: float | None = None) -> BatchSolver:
@@ -25,7 +23,8 @@ def make_solver(name: str, tolerance: float | None = None) -> BatchSolver:
     """
     if name not in _SOLVERS:
         raise ArgumentError("solver", repr(name), f"must be one of {sorted(_SOLVERS)}{suggestion(name, _SOLVERS)}")
-    return _SOLVERS[name]() if tolerance is None else _SOLVERS[name](tolerance=tolerance)
+    kind: type[BatchSolver] = getattr(import_module(f"fracctl.solvers.{name}"), _SOLVERS[name])
+    return kind() if tolerance is None else kind(tolerance=tolerance)  # type: ignore[call-arg]
 
 
 def solve(
