@@ -28,8 +28,8 @@ from fracctl.solvers.contour_response import respond
 from fracctl.solvers.members import Members
 from fracctl.solvers.results import packed, without_trajectory
 
-_CHUNK = 1536
-"""Trajectories solved at once: their transforms stay in the cache."""
+_CHUNK = 384
+"""Trajectories solved at once: few enough that their memory is used again instead of fetched anew."""
 _SMALLEST_TOLERANCE = 1e-12
 _SERIES_ORDER, _COUPLED_SERIES_ORDER = 6, 5
 """Highest power of time near 0: coupled coordinates have so many powers that a further window is cheaper."""

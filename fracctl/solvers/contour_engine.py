@@ -66,7 +66,7 @@ class Wanted(NamedTuple):
     stored: Array
     """Which of them are stored, positions first."""
     used: Array
-    """Which of them controls are made of."""
+    """Which of them controls are made of, filled up to an even number."""
 
 
 class Members(NamedTuple):
@@ -77,7 +77,7 @@ class Members(NamedTuple):
     entries: Floats
     """Coefficients of M̃, (blocks, t LANES)."""
     sources: Floats
-    """Coefficients of r, (blocks, k, t' LANES)."""
+    """Coefficients of r, (blocks, k t' LANES)."""
     feeds: Floats
     """Gains of the recursion, (blocks, entries, LANES)."""
     initial: Floats
@@ -87,7 +87,7 @@ class Members(NamedTuple):
     added: Floats
     """Coefficients of `shapes`, (blocks, w, k, LANES)."""
     gains: Floats
-    """υ_i = Σ_w gains[i, w] values[w], (blocks, m, w, LANES)."""
+    """υ_i = Σ_u gains[i, u] values[used[u]], (blocks, m, u, LANES)."""
 
 
 class Outputs(NamedTuple):
@@ -233,10 +233,9 @@ def _multiply(
             other = scratch[: len(other)]
         at = windows.places[request, number, 1]
         kernel = windows.kernels[at : at + count * len(checked) * len(other)].reshape(-1, len(other))
+        compared = np.dot(kernel, other)
         for w in range(count):
-            few = kernel[w * len(checked) : (w + 1) * len(checked)]
-            compared = np.dot(few, other)
-            enlarge_by_gaps(differences[first + w], values[first + w], checked, compared)
+            enlarge_by_gaps(differences, first + w, values, checked, compared, w * len(checked))
 
 
 @compiled
@@ -260,27 +259,26 @@ def _finish(
         tails: and end of those that are last coefficients.
         grid: the first of these nodes.
         wanted: which derivatives are stored or make controls.
-        gains: (m, w, LANES).
+        gains: (m, u, LANES).
         place: of the block among the members.
         scratch: for one control.
         sizes: running results.
         outputs: of all members.
     """
-    m = len(gains)
+    m, control = len(gains), scratch[: values.shape[1]]
     for i in range(len(wanted.stored)):
         rows = values[wanted.stored[i]]
         if i < m:
-            enlarge(sizes.peaks[0], rows[:nodes])
-            enlarge(sizes.tails[0], rows[nodes:tails])
-            transpose(rows[:nodes], grid, place.first, place.live, outputs.positions, i)
+            enlarge(sizes.peaks, 0, rows, 0, nodes)
+            enlarge(sizes.tails, 0, rows, nodes, tails)
+            transpose(rows, nodes, grid, place.first, place.live, outputs.positions, i)
         else:
-            transpose(rows[:nodes], grid, place.first, place.live, outputs.others, i - m)
+            transpose(rows, nodes, grid, place.first, place.live, outputs.others, i - m)
     for i in range(m):
-        control = scratch[: values.shape[1]]
-        combine(values, wanted.used, gains[i], control)
-        enlarge(sizes.peaks[1], control[:nodes])
-        enlarge(sizes.tails[1], control[nodes:tails])
-        transpose(control[:nodes], grid, place.first, place.live, outputs.controls, i)
+        combine(values, wanted.used, gains, i, control)
+        enlarge(sizes.peaks, 1, control, 0, nodes)
+        enlarge(sizes.tails, 1, control, nodes, tails)
+        transpose(control, nodes, grid, place.first, place.live, outputs.controls, i)
         for extra in range(tails, len(control)):
             for k in range(len(outputs.controls)):
                 for n in range(place.live):
@@ -290,7 +288,7 @@ def _finish(
 @compiled
 def _conclude(wanted: Wanted, gains: Floats, place: _Place, sizes: _Sizes, outputs: Outputs) -> None:
     """Write peaks and errors of a block."""
-    m, size = len(gains), len(sizes.differences)
+    m = len(gains)
     for at in range(0, sizes.peaks.shape[1], LANES):
         k = at // LANES
         for n in range(place.live):
@@ -299,8 +297,8 @@ def _conclude(wanted: Wanted, gains: Floats, place: _Place, sizes: _Sizes, outpu
             for i in range(m):
                 position = larger(position, sizes.differences[wanted.stored[i], at + n])
                 total = 0.0
-                for w in range(size):
-                    total += abs(gains[i, w, n]) * sizes.differences[w, at + n]
+                for u in range(len(wanted.used)):
+                    total += abs(gains[i, u, n]) * sizes.differences[wanted.used[u], at + n]
                 control = larger(control, total)
             outputs.errors[k, member, 0], outputs.errors[k, member, 1] = position, control
             for i in range(2):

@@ -14,6 +14,8 @@ from fracctl.compiling import compiled_with
 
 LANES = 64
 """Members of a block."""
+WIDTH = np.uint64(LANES)
+"""The same for compiled loops: places computed without signs need no test for negative ones, which bars vectors."""
 
 compiled = compiled_with(error_model="numpy", fastmath={"reassoc", "contract", "nsz", "arcp"})
 

@@ -50,7 +50,7 @@ class Loops:
     kernels: tuple[tuple[float, ...], ...]
     """Exponents of the kernels of each request."""
     gains: Floats
-    """υ_i = Σ_w gains[i, w] values[w], (m, w, b)."""
+    """υ_i = Σ_u gains[i, u] values[used[u]], (m, u, b)."""
     added: Floats
     """What D^γ y has besides σ^γ Z is c t^p / Γ(p + 1): c, (w, k, b)."""
     powers: list[Floats]
@@ -80,8 +80,10 @@ def loops(system: LinearFractionalSystem, y0: Floats, y0_rate: Floats, with_rate
     entries, coefficients = _sums(
         [_entry(matrix, i, j) for block in blocks for i in block for j in block], exponents, (b,)
     )
-    sources, source_coefficients = _sums([_source(system, i, y0, y0_rate) for i in range(p)], exponents, y0.shape[:2])
-    derivatives, gains = _derivatives(system, with_rates)
+    sources, source_coefficients = _sums(
+        [_source(system, i, y0, y0_rate) for block in blocks for i in block], exponents, y0.shape[:2]
+    )
+    derivatives, used, gains = _derivatives(system, with_rates)
     highest = [float(order) for order in system.highest]
     requests, kernels = _requests(derivatives, highest, exponents)
     added = [_initial_value(wanted, y0, y0_rate) for wanted in derivatives]
@@ -101,7 +103,7 @@ def loops(system: LinearFractionalSystem, y0: Floats, y0_rate: Floats, with_rate
             np.array([wanted.component for wanted in derivatives]),
             requests,
             np.array(stored),
-            np.flatnonzero(gains.any(axis=(0, 2))),
+            used,
         ),
         kernels,
         gains,
@@ -165,8 +167,8 @@ def _source(system: LinearFractionalSystem, row: int, y0: Floats, y0_rate: Float
     return powers
 
 
-def _derivatives(system: LinearFractionalSystem, with_rates: bool) -> tuple[list[Derivative], Floats]:
-    """Return what is wanted, by coordinate and with shared orders first, and the gains (m, w, b) of controls."""
+def _derivatives(system: LinearFractionalSystem, with_rates: bool) -> tuple[list[Derivative], Array, Floats]:
+    """Return what is wanted, by coordinate and with shared orders first, and of the controls `used` and gains."""
     zero, one = np.zeros(()), np.ones(())
     wanted = [Derivative(i, zero) for i in range(system.size)]
     wanted += [Derivative(i, one) for i in range(system.n_positions)] if with_rates else []
@@ -179,11 +181,12 @@ def _derivatives(system: LinearFractionalSystem, with_rates: bool) -> tuple[list
         if not any(derivative.same(known) for known in wanted):
             wanted.append(derivative)
     wanted.sort(key=lambda derivative: (derivative.component, derivative.order.ndim))
-    gains = np.zeros((system.n_positions, len(wanted), system.batch or 1))
-    for derivative, gain in parts:
-        where = next(i for i, known in enumerate(wanted) if known.same(derivative))
-        gains[:, where] += gain.T if gain.ndim == 2 else gain[:, None]
-    return wanted, gains
+    places = [next(i for i, known in enumerate(wanted) if known.same(derivative)) for derivative, _ in parts]
+    used = sorted(set(places)) or [0]
+    gains = np.zeros((system.n_positions, len(used) + len(used) % 2, system.batch or 1))
+    for place, (_, gain) in zip(places, parts, strict=True):
+        gains[:, used.index(place)] += gain.T if gain.ndim == 2 else gain[:, None]
+    return wanted, np.array(used + used[: len(used) % 2], dtype=np.intp), gains
 
 
 def _requests(

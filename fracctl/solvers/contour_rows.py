@@ -8,37 +8,53 @@ from __future__ import annotations
 import numpy as np
 
 from fracctl.arrays import Array, Floats
-from fracctl.solvers.contour_lanes import LANES, compiled, larger
+from fracctl.solvers.contour_lanes import LANES, WIDTH, compiled, larger
 
 
 @compiled
-def enlarge(largest: Floats, rows: Floats) -> None:
-    """Take the magnitudes of all rows into the largest, (k LANES,)."""
-    for row in rows:
-        for n in range(len(largest)):
-            largest[n] = larger(largest[n], abs(row[n]))
+def enlarge(largest: Floats, which: int, rows: Floats, first: int, stop: int) -> None:
+    """Take the magnitudes of some rows, four at a time, into the largest (s, k LANES) at `which`."""
+    for r in range(first, stop, 4):
+        s, t, u = min(r + 1, stop - 1), min(r + 2, stop - 1), min(r + 3, stop - 1)
+        for n in range(rows.shape[1]):
+            a, b = larger(abs(rows[r, n]), abs(rows[s, n])), larger(abs(rows[t, n]), abs(rows[u, n]))
+            largest[which, n] = larger(largest[which, n], larger(a, b))
 
 
 @compiled
-def enlarge_by_gaps(largest: Floats, rows: Floats, which: Array, others: Floats) -> None:
-    """Take the differences between `which` of the rows and others into the largest."""
-    for i in range(len(which)):
-        row, other = rows[which[i]], others[i]
-        for n in range(len(largest)):
-            largest[n] = larger(largest[n], abs(row[n] - other[n]))
+def enlarge_by_gaps(largest: Floats, which: int, values: Floats, checked: Array, others: Floats, first: int) -> None:
+    """Take the differences between the checked rows of values[which] and others[first:] into largest[which]."""
+    for i in range(len(checked)):
+        r = checked[i]
+        for n in range(others.shape[1]):
+            largest[which, n] = larger(largest[which, n], abs(values[which, r, n] - others[first + i, n]))
 
 
 @compiled
-def combine(values: Floats, used: Array, gains: Floats, out: Floats) -> None:
-    """Σ_w gains[w] values[w] of the `used` derivatives; values (w, r, k LANES), gains (w, LANES), out (r, k LANES)."""
-    out[:] = 0.0
-    for r in range(len(out)):
+def combine(values: Floats, used: Array, gains: Floats, control: int, out: Floats) -> None:
+    """Σ_u gains[control, u] values[used[u]], two terms at a time.
+
+    Values are (w, r, k LANES), gains (m, u, LANES) with u even, out is (r, k LANES).
+    """
+    for r in range(values.shape[1]):
         for k in range(out.shape[1] // LANES):
-            target = out[r, k * LANES : (k + 1) * LANES]
-            for w in used:
-                gain, value = gains[w], values[w, r, k * LANES : (k + 1) * LANES]
-                for n in range(LANES):
-                    target[n] += gain[n] * value[n]
+            at = WIDTH * np.uint64(k)
+            for u in range(0, len(used), 2):
+                v, w = used[u], used[u + 1]
+                if u == 0:
+                    for n in range(WIDTH):
+                        x, y = (
+                            gains[control, u, n] * values[v, r, at + n],
+                            gains[control, u + 1, n] * values[w, r, at + n],
+                        )
+                        out[r, at + n] = x + y
+                else:
+                    for n in range(WIDTH):
+                        x, y = (
+                            gains[control, u, n] * values[v, r, at + n],
+                            gains[control, u + 1, n] * values[w, r, at + n],
+                        )
+                        out[r, at + n] += x + y
 
 
 @compiled
@@ -85,12 +101,14 @@ def times_powers(rows: Floats, table: Floats, first: int, column: int, out: Floa
 
 
 @compiled
-def transpose(rows: Floats, first: int, member: int, live: int, out: Floats, column: int) -> None:
-    """Write rows as those of `live` members from `member` on, out[:, member:, column, first:]."""
-    for k in range(len(out)):
-        for begin in range(0, len(rows), 8):
-            end = min(begin + 8, len(rows))
-            for i in range(live):
-                target = out[k, member + i, column, first + begin : first + end]
-                for n in range(end - begin):
-                    target[n] = rows[begin + n, k * LANES + i]
+def transpose(rows: Floats, count: int, first: int, member: int, live: int, out: Floats, column: int) -> None:
+    """Write `count` rows as those of `live` members from `member` on, out[:, member:, column, first:]."""
+    source, target = rows.reshape(-1), out.reshape(-1)
+    starts, members, columns, nodes = out.shape
+    stride = np.uint64(rows.shape[1])
+    for k in range(starts):
+        for i in range(live):
+            at = np.uint64(k * LANES + i)
+            to = np.uint64(((k * members + member + i) * columns + column) * nodes + first)
+            for n in range(np.uint64(count)):
+                target[to + n] = source[n * stride + at]
