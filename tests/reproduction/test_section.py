@@ -154,3 +154,13 @@ def test_what_goes_wrong_below_is_passed_on(
 @pytest.mark.slow
 def test_the_full_survey(suite: Suite, tmp_path: Path) -> None:
     check(reproduce(suite, "out_of_plane", [f"output_dir={tmp_path}"]))
+
+
+@pytest.mark.slow
+def test_what_the_in_plane_paper_lets_decide_comes_out(suite: Suite, output_dir: Path) -> None:
+    result = reproduce(suite, "in_plane", [f"output_dir={output_dir}", "figures=null"])
+    assert result.failures == []
+    assert result.counts == {"reproduced": 28, "not_reproduced": 3, "not_decidable": 34}
+    for row in result.rows:
+        if row.published.id.startswith(("lqr_k", "ic1_st_os_pd_k")):
+            assert row.difference == 0
