@@ -79,6 +79,7 @@ class Figure(Typed):
         "objective_against_order",
         "order_contours",
         "pareto_fronts",
+        "poles",
         "work_precision",
     ]
     objective: str | None = None

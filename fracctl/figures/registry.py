@@ -16,6 +16,7 @@ from fracctl.figures import (
     objective_against_order,
     order_contours,
     pareto_fronts,
+    poles,
     trajectories,
     work_precision,
 )
@@ -30,6 +31,7 @@ TYPES: Mapping[str, Callable[[Results, Selection], tuple[Figure, pd.DataFrame]]]
     "objective_against_order": objective_against_order.build,
     "order_contours": order_contours.build,
     "pareto_fronts": pareto_fronts.build,
+    "poles": poles.build,
     "work_precision": work_precision.build,
 }
 """Type in the configuration to the function that makes the figure and the table behind it."""

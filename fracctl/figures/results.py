@@ -52,6 +52,11 @@ class Results:
         return self.run.trajectories()
 
     @cached_property
+    def poles(self) -> pd.DataFrame:
+        """Poles and pseudo-state eigenvalues of the points that figures show."""
+        return self.run.poles()
+
+    @cached_property
     def components(self) -> tuple[str, ...]:
         """Names of the controlled positions."""
         columns = map(str, self.trajectories.columns)

@@ -11,8 +11,10 @@ from pydantic import ValidationError
 
 from fracctl.config.compose import compose
 from fracctl.config.messages import InvalidConfiguration, problems
+from fracctl.config.registry import names
 from fracctl.config.schemas import Figure, RunConfig
 
+CONTROLLERS = ", ".join(names("controllers"))
 FIGURES = [f"'{name}'" for name in get_args(Figure.model_fields["type"].annotation)]
 LINEAR = ("plant=linear", "controller=pd_alpha_own", "initial_condition=own", "initial_condition.own.x=1")
 
@@ -68,7 +70,7 @@ def test_all_errors_come_at_once() -> None:
         (["controller.k_p_w=true"], "controller.k_p_w = true: must be a number"),
         (["controller.k_p_w='1'"], "controller.k_p_w = 1: must be a number"),
         (["controller.k_p_w=null"], "controller.k_p_w = null: must be a number"),
-        (["controller.type=pid"], "controller.type = pid: must be one of pd, pd_alpha; did you mean 'pd'?"),
+        (["controller.type=pq"], f"controller.type = pq: must be one of {CONTROLLERS}; did you mean 'pd'?"),
         (["plant.type=moon"], "plant.type = moon: must be one of hcw, hcw_in_plane, hcw_out_of_plane, linear"),
         (["plant.chief.semi_major_axis_km=-1"], "plant.chief.semi_major_axis_km = -1: must be a positive number"),
         (["plant.chief.mass=1"], ("unknown key 'plant.chief.mass'; allowed: semi_major_axis_km, inclination_deg, "
