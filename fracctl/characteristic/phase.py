@@ -6,6 +6,8 @@ the branch point at its end. What is followed is det M / Π (σ + ρ)^ℓ, finit
 
 Steps next to which the function changes by its own size are halved until none does: two zeros close to each other and
 to the path turn the phase by 2π within a step that they leave no other trace in than this rate of change.
+
+No path is needed for one coordinate where Im M(i r) = Σ c r^β sin(β π/2) has one sign for all r.
 """
 
 from __future__ import annotations
@@ -57,14 +59,18 @@ def zeros_to_the_right(
     parts, beyond = (2, 0) if size < 3 else (2 * size, 1)
     entries, work, part = np.empty((2, size * size, nodes)), np.empty((2, nodes)), np.empty((4, parts + 1 + 2 * beyond))
     matrix, sums, stack = np.empty((size, size), np.complex128), np.empty(size), np.empty((nodes + 64 * parts, 2, 4))
-    end = 0
+    lift, end = np.empty(len(place)), 0
     for i in range(count):
         c, e = coefficients[i], exponents[min(i, len(exponents) - 1)]
         if i == 0 or len(exponents) > 1:
-            _tabulate(e, place, highest, path, table, reach)
+            _tabulate(e, place, highest, path, table, reach, lift)
         static, integral = _at_origin(c, e, place, highest, matrix, sums)
         if not integral and abs(static) <= vanishing[i]:
             continue
+        if size == 1 and not integral:
+            zeros[i], resolved[i] = _by_sign(c, lift, static)
+            if resolved[i]:
+                continue
         end = _disc(c, reach, place, sums, 0.0 if integral else _DISC * abs(static), end)
         last = min(end + 1, len(line) - 1) if end < len(line) else nodes - 1
         _evaluate(c, table, place, last + 1, factor, entries, path)
@@ -102,11 +108,14 @@ def _factor(log_r: float, angle: float, degree: float) -> tuple[float, float]:
 
 
 @compiled
-def _tabulate(e: Floats, place: Array, highest: Floats, path: Floats, table: Floats, reach: Floats) -> None:
-    """Fill in real and imaginary parts of σ^e, (2, K, nodes), and on the line |σ|^β, (n, K), with 0 for β = 0."""
+def _tabulate(
+    e: Floats, place: Array, highest: Floats, path: Floats, table: Floats, reach: Floats, lift: Floats
+) -> None:
+    """Fill in real and imaginary parts of σ^e, (2, K, nodes), |σ|^β on the line, (n, K), 0 for β = 0, and sin(β π/2)."""
     log_r, angle = path[0], path[1]
     for t in range(len(e)):
         order = e[t] + highest[place[t, 1]]
+        lift[t] = _cis(order)[1]
         x, y = _cis(e[t])
         for n in range(len(log_r)):
             if n < len(reach):
@@ -134,6 +143,19 @@ def _at_origin(
         for k in range(len(highest)):
             sums[j] += abs(matrix[j, k].real)
     return _determinant(matrix).real, integral
+
+
+@compiled
+def _by_sign(c: Floats, lift: Floats, static: float) -> tuple[int, bool]:
+    """Count the zeros of one coordinate if Im M has one sign on the upper imaginary axis, and say whether it has.
+
+    From a phase of ℓ π/2 at infinity, M then goes to M(0) through the upper half plane alone, or the lower.
+    """
+    up, down = False, False
+    for t in range(len(c)):
+        up |= c[t] * lift[t] > 0.0
+        down |= c[t] * lift[t] < 0.0
+    return (1 if static < 0.0 else 2 if down else 0), up != down
 
 
 @compiled

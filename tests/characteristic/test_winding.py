@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import pytest
 from scipy.linalg import block_diag
@@ -9,13 +11,29 @@ from scipy.optimize import brentq
 
 from fracctl.characteristic import CharacteristicMatrix, abscissa_bound, principal_poles, unstable_zeros
 from fracctl.characteristic.bounds import pole_radius
-from fracctl.controllers import PDAlpha
+from fracctl.controllers import LinearLawTerms, PDAlpha
 from fracctl.errors import ArgumentError
+from fracctl.fractional.terms import FractionalTerm
 from fracctl.loop import ClosedLoop
 from fracctl.plants import HCWInPlane, LinearPlant
 from tests.references import loops, poles
 from tests.references.loops import Loop
 from tests.references.product import closed_loop
+
+
+@dataclass(frozen=True)
+class TwoOrders:
+    """υ = -c ξ - k₁ D^1.5 ξ - k₂ D^0.5 ξ of one coordinate, all (b,)."""
+
+    c: np.ndarray
+    k1: np.ndarray
+    k2: np.ndarray
+
+    def linear_terms(self, n_controls: int) -> LinearLawTerms:
+        gains = ((self.c, 0.0), (self.k1, 1.5), (self.k2, 0.5))
+        return LinearLawTerms(
+            tuple(FractionalTerm(-k[:, None, None], np.full(n_controls, order)) for k, order in gains)
+        )
 
 
 @pytest.fixture(scope="module")
@@ -84,6 +102,29 @@ def test_zeros_close_to_the_origin_are_counted() -> None:
         zeros, marginal = unstable_zeros(characteristic(LinearPlant(0.0), c, k, alpha))
         assert not marginal.any()
         np.testing.assert_array_equal(zeros, 2.0)
+
+
+@pytest.mark.parametrize("alpha", [0.3, 0.9, 1.0])
+def test_counts_of_one_coordinate_by_its_signs(alpha: float) -> None:
+    """Descartes' rule for σ² + k σ^α + c: one real zero for c < 0; for c > 0 two zeros on the right if k < 0."""
+    k, c = np.array([2.0, 2.0, -2.0, -2.0, 1e-18]), np.array([3.0, -3.0, 3.0, -3.0, 3.0])
+    zeros, marginal = unstable_zeros(characteristic(LinearPlant(0.0), c, k, alpha))
+    assert not marginal.any()
+    np.testing.assert_array_equal(zeros, [0.0, 1.0, 2.0, 1.0, 0.0])
+    members = [loops.out_of_plane(p - 1.0, d, alpha, np.zeros(2)) for p, d in zip(c[:4], k[:4], strict=True)]
+    np.testing.assert_array_equal(zeros[:4], [poles.unstable_count(member) for member in members])
+
+
+def test_terms_of_different_signs_in_one_coordinate() -> None:
+    """σ² + k₁ σ^1.5 + k₂ σ^0.5 + c with k₁ k₂ < 0: Im M changes its sign, so that the path has to decide."""
+    generator = np.random.default_rng(6)
+    k1, k2, c = generator.uniform(0.1, 3.0, (3, 200)) * np.array([1.0, -1.0, 1.0])[:, None]
+    zeros, marginal = unstable_zeros(CharacteristicMatrix(ClosedLoop(LinearPlant(0.0), TwoOrders(c, k1, k2)).system))
+    assert not marginal.any()
+    roots = [np.roots([1.0, a, 0.0, b, p]) for a, b, p in zip(k1, k2, c, strict=True)]
+    expected = [(np.abs(np.angle(values)) < np.pi / 4.0).sum() for values in roots]
+    np.testing.assert_array_equal(zeros, expected)
+    assert set(expected) == {0, 2}
 
 
 def test_blocks_count_as_they_do_alone(members: list[Loop]) -> None:
