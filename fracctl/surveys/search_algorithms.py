@@ -58,10 +58,7 @@ class Optimiser:
 
     def tell(self, values: Floats) -> None:
         """Hand back the values (p, k) of the points that were asked last."""
-        from pymoo.core.evaluator import Evaluator
-        from pymoo.problems.static import StaticProblem
-
-        Evaluator().eval(StaticProblem(self._problem, F=values), self._asked)
+        self._asked.set("F", values)
         self._running.tell(infills=self._asked)
 
     def _begin(self, population: Floats) -> Any:
