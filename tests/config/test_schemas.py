@@ -70,7 +70,7 @@ def test_all_errors_come_at_once() -> None:
         (["controller.k_p_w=true"], "controller.k_p_w = true: must be a number"),
         (["controller.k_p_w='1'"], "controller.k_p_w = 1: must be a number"),
         (["controller.k_p_w=null"], "controller.k_p_w = null: must be a number"),
-        (["controller.type=pq"], f"controller.type = pq: must be one of {CONTROLLERS}; did you mean 'pd'?"),
+        (["controller.type=pdx"], f"controller.type = pdx: must be one of {CONTROLLERS}; did you mean 'pd'?"),
         (["plant.type=moon"], "plant.type = moon: must be one of hcw, hcw_in_plane, hcw_out_of_plane, linear"),
         (["plant.chief.semi_major_axis_km=-1"], "plant.chief.semi_major_axis_km = -1: must be a positive number"),
         (["plant.chief.mass=1"], ("unknown key 'plant.chief.mass'; allowed: semi_major_axis_km, inclination_deg, "
