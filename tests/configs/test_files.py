@@ -65,7 +65,7 @@ TINY_SETTINGS = {
 CONTINUATIONS = ("ic1_inplane", "ic2_inplane", "ic3_inplane", "inplane")
 TINY_CONTINUATION = [
     "survey.axes.alpha_u=[0.99,1.0]",
-    "survey.axes.alpha_v=1.0",
+    "survey.axes.alpha_v=[0.99,1.0]",
     "survey.first_steps=[0.5]",
     "survey.steps=[0.5]",
     "scheduler=serial",
@@ -78,8 +78,8 @@ TINY_SEARCH = [
     "survey.starts=1",
     "scheduler=serial",
 ]
-SINGLE = ("inplane_decoupled",)
-"""Experiments of one design point, which have no budget."""
+FIXED = {"inplane_decoupled": 1, "inplane_lqr": 1, "inplane_published": 2}
+"""Experiments of so few design points that they need no budget, with their number."""
 
 
 def test_the_groups() -> None:
@@ -112,11 +112,11 @@ def test_a_continuation_runs_on_a_tiny_budget(name: str, tmp_path: Path) -> None
     result = execute(config)
     tracks = len(config.objectives) * len(config.initial_condition)
     assert result.summary["status"] == "finished"
-    assert result.evaluations["point"].nunique() == 2 * tracks
+    assert result.evaluations["point"].nunique() == 5 * tracks
     assert result.optima.groupby("kind").size().to_dict() == {
         "overall": tracks,
         "baseline": tracks,
-        "slice": 2 * tracks,
+        "slice": 4 * tracks,
     }
     assert {path.stem for path in (result.run_directory / "figures").glob("*.pdf")} == set(config.figures)
 
@@ -132,12 +132,12 @@ def test_a_search_runs_on_a_tiny_budget(name: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", sorted({*EXPERIMENTS} - {*CONTINUATIONS} - {*SEARCHES}))
 def test_an_experiment_runs_on_a_tiny_budget(name: str, tmp_path: Path) -> None:
-    budget = [] if name in SINGLE else [*TINY, *TINY_SETTINGS.get(name, [])]
+    budget = [] if name in FIXED else [*TINY, *TINY_SETTINGS.get(name, [])]
     config = compose([f"experiment={name}", *budget, f"output_dir={tmp_path}"])
     result = execute(config)
     settings = max(1, len(build_checked(config)[0].axes.get("setting", ())))
     assert result.summary["status"] == "finished"
-    assert len(result.evaluations) == (1 if name in SINGLE else 8) * settings * len(config.initial_condition)
+    assert len(result.evaluations) == FIXED.get(name, 8) * settings * len(config.initial_condition)
     assert {path.stem for path in (result.run_directory / "figures").glob("*.pdf")} == set(config.figures)
 
 
