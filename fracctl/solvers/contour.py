@@ -24,12 +24,10 @@ from fracctl.solvers.base import Survey
 from fracctl.solvers.batched import BatchSolver
 from fracctl.solvers.contour_loops import loops
 from fracctl.solvers.contour_plan import make_plan
-from fracctl.solvers.contour_response import respond
+from fracctl.solvers.contour_response import responses
 from fracctl.solvers.members import Members
 from fracctl.solvers.results import packed, without_trajectory
 
-_CHUNK = 384
-"""Trajectories solved at once: few enough that their memory is used again instead of fetched anew."""
 _SMALLEST_TOLERANCE = 1e-12
 _SERIES_ORDER, _COUPLED_SERIES_ORDER = 6, 5
 """Highest power of time near 0: coupled coordinates have so many powers that a further window is cheaper."""
@@ -92,7 +90,7 @@ class Contour(BatchSolver):
         batch = loops(members.system, members.y0, members.rate, members.every, order)
         for attempt in _ATTEMPTS:
             missed: list[Array] = []
-            for group in _classes(rows, radius, shift, attempt.ratio, max(_CHUNK // len(members.y0), 1)):
+            for group in _classes(rows, radius, shift, attempt.ratio):
                 tolerance = max(attempt.safety * self.tolerance, _SMALLEST_TOLERANCE)
                 try:
                     hull = group.radius * (attempt.width if single else attempt.coupled)
@@ -103,23 +101,21 @@ class Contour(BatchSolver):
                     yield without_trajectory(members.take(group.rows), "failed")
                     continue
                 cost[group.rows] += plan.nodes
-                response, enclosed = respond(batch, group.rows, plan)
-                good = enclosed & (response.error.max(axis=0) <= self.tolerance)
-                done = good if attempt is not _ATTEMPTS[-1] else np.ones_like(good)
-                missed.append(group.rows[~done])
-                if done.any():
-                    part = members.take(group.rows)
-                    yield packed(part, response, np.flatnonzero(done), good, cost[group.rows], plan.grid)
+                for some, response, enclosed in responses(batch, group.rows, plan):
+                    good = enclosed & (response.error.max(axis=0) <= self.tolerance)
+                    done = good if attempt is not _ATTEMPTS[-1] else np.ones_like(good)
+                    missed.append(some[~done])
+                    if done.any():
+                        part = members.take(some)
+                        yield packed(part, response, np.flatnonzero(done), good, cost[some], plan.grid)
             rows = np.concatenate([np.zeros(0, dtype=np.intp), *missed])
             if not rows.size:
                 return
 
 
-def _classes(rows: Array, radius: Floats, shift: Floats, ratio: float, chunk: int) -> Iterator[_Group]:
-    """Split rows by shift and by pole radius, rounded up to powers of `ratio`, into chunks."""
+def _classes(rows: Array, radius: Floats, shift: Floats, ratio: float) -> Iterator[_Group]:
+    """Split rows by shift and by pole radius, rounded up to powers of `ratio`."""
     level = np.ceil(np.log(radius[rows]) / np.log(ratio)).astype(int)
     for a in np.unique(shift[rows]):
         for k in np.unique(level[shift[rows] == a]):
-            group = rows[(shift[rows] == a) & (level == k)]
-            for start in range(0, len(group), chunk):
-                yield _Group(group[start : start + chunk], float(ratio**k), float(a))
+            yield _Group(rows[(shift[rows] == a) & (level == k)], float(ratio**k), float(a))

@@ -129,22 +129,20 @@ class _Sizes(NamedTuple):
 
 @compiled
 def respond_blocks(
-    matrix: Matrix, start: Start, windows: Windows, wanted: Wanted, members: Members, outputs: Outputs
+    matrix: Matrix, start: Start, windows: Windows, wanted: Wanted, members: Members, first_block: int, outputs: Outputs
 ) -> None:
-    """Fill in the outputs."""
+    """Fill in the outputs of some blocks of members."""
     starts, size = len(outputs.controls), len(matrix.coordinates)
     width, count = starts * LANES, len(wanted.components)
     most, nodes = max(windows.numbers[:, 5].max(), start.matrix.shape[2]), windows.numbers[:, 2].max()
     odd, even = np.empty(size * 2 * nodes * width), np.empty(size * 2 * (nodes + 1) * width)
     values, scratch = np.empty(count * most * width), np.empty((max(most, 2 * nodes + 2), width))
     sizes = _Sizes(np.empty((2, width)), np.empty((2, width)), np.empty((count, width)))
-    for block in range(len(members.entries)):
+    for member in range(0, len(outputs.enclosed), LANES):
         for part in sizes:
             part[:] = 0.0
-        enclosed, place = (
-            np.ones(LANES, np.bool_),
-            _Place(block * LANES, min(LANES, len(outputs.enclosed) - block * LANES)),
-        )
+        block, enclosed = first_block + member // LANES, np.ones(LANES, np.bool_)
+        place = _Place(member, min(LANES, len(outputs.enclosed) - member))
         table, shapes = _own(members.table, block), _own(windows.shapes, block)
         gains, rows, done = members.gains[block], start.matrix.shape[2], 0
         derivatives = values[: count * rows * width].reshape(count, rows, width)
