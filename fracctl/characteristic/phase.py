@@ -111,7 +111,7 @@ def _factor(log_r: float, angle: float, degree: float) -> tuple[float, float]:
 def _tabulate(
     e: Floats, place: Array, highest: Floats, path: Floats, table: Floats, reach: Floats, lift: Floats
 ) -> None:
-    """Fill in real and imaginary parts of σ^e, (2, K, nodes), |σ|^β on the line, (n, K), 0 for β = 0, and sin(β π/2)."""
+    """Fill in real and imaginary parts of σ^e, (2, K, nodes), |σ|^β on the line, (n, K), 0 at β = 0, sin(β π/2)."""
     log_r, angle = path[0], path[1]
     for t in range(len(e)):
         order = e[t] + highest[place[t, 1]]
