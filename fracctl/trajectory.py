@@ -56,11 +56,6 @@ class Trajectory:
         return np.isnan(self.positions[:, 0, -1])
 
     @property
-    def by_component(self) -> Floats:
-        """ξ at the nodes, (m, b, T), as most solvers have it in memory."""
-        return np.swapaxes(self.positions, 0, 1)
-
-    @property
     def times(self) -> Floats:
         """Times of `states` and `controls`, (t,): 0 and the nodes of all panels."""
         return np.concatenate([[0.0], self.grid.times[self._distinct]])

@@ -146,3 +146,20 @@ def test_missing_values_are_infinite() -> None:
         absolute_integral(GRID, values),
     ):
         assert measured[0] == np.inf
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_dip_next_to_a_change_of_sign_is_integrated(turned: bool) -> None:
+    """Three zeros in two intervals, of which the nodes show one: r, and a pair behind the next node."""
+    gap = B - A
+    zeros = np.array([A - 0.3 * gap, A + 0.4 * gap, A + 0.7 * gap])
+    if turned:
+        zeros = A + B - zeros[::-1]
+    cubic = np.polynomial.Polynomial.fromroots(zeros)
+    values = cubic(GRID.times)[None]
+    assert np.count_nonzero(np.diff(np.sign(values[0, 48:]))) == 1
+    integral = cubic.integ()
+    exact = np.abs(np.diff(integral(np.concatenate([[0.0], zeros, [7.0]])))).sum()
+    computed = absolute_integral(GRID, values)[0]
+    shown = np.abs(np.diff(integral(np.array([0.0, zeros[2 if turned else 0], 7.0])))).sum()
+    assert abs(computed - exact) < 1e-3 * (exact - shown)

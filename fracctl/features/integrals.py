@@ -54,25 +54,37 @@ def _absolute_integral(
                     reached = _integral_to(nodes, integrals, clock, row, first, stop, panel, j, zero)
                     total += abs(reached - mark)
                     mark = reached
+                    for i in (j, j + 1):
+                        total += _dip(nodes, slopes, integrals, clock, row, first, stop, panel, i)
         total += abs(weighted(integrals, stop - 1, row, first, stop) - mark)
         bar = _SHALLOW * max(high, -low)
-        if low < bar and high > -bar and _has_dip(row, first, stop, bar):
-            total += _dips(nodes, slopes, integrals, clock, row, first, stop, panel, bar)
+        if low < bar and high > -bar and _has_low(row, first, stop, bar):
+            for i in range(first, stop):
+                if _is_low(row, first, stop, i, bar):
+                    total += _dip(nodes, slopes, integrals, clock, row, first, stop, panel, i)
     return total
 
 
 @comparing
-def _has_dip(row: Floats, first: int, stop: int, bar: float) -> bool:
-    """Whether |row| is below `bar` at an end of a panel, or at a node where it is no larger than at both neighbours."""
+def _has_low(row: Floats, first: int, stop: int, bar: float) -> bool:
+    """Whether a node of a panel is `_is_low`."""
     count, one = 0, np.uint64(1)
     for j in range(np.uint64(first + 1), np.uint64(stop - 1)):
         here, before, after = abs(row[j]), row[j] * row[j - one], row[j] * row[j + one]
         count += here < bar and before >= here * here and after >= here * here
-    return count > 0 or abs(row[first]) < bar or abs(row[stop - 1]) < bar
+    return count > 0 or _is_low(row, first, stop, first, bar) or _is_low(row, first, stop, stop - 1, bar)
 
 
 @compiled
-def _dips(
+def _is_low(row: Floats, first: int, stop: int, j: int, bar: float) -> bool:
+    """Whether |row| is below `bar` and no larger at the node j than its neighbours in the panel, of the same sign."""
+    here = row[j]
+    low: bool = abs(here) < bar and (j == first or here * row[j - 1] >= here * here)
+    return low and (j + 1 == stop or here * row[j + 1] >= here * here)
+
+
+@compiled
+def _dip(
     nodes: Floats,
     slopes: Floats,
     integrals: Floats,
@@ -81,24 +93,26 @@ def _dips(
     first: int,
     stop: int,
     panel: int,
-    bar: float,
+    i: int,
 ) -> float:
-    """What ∫ |values| over a panel gains by changes of sign between two nodes of one sign."""
-    gain = 0.0
-    for i in range(first, stop):
-        if abs(row[i]) < bar:
-            slope = weighted(slopes, i, row, first, stop)
-            k = i + 1 if slope * row[i] < 0.0 else i - 1
-            turns = first <= k < stop and row[i] * row[k] >= row[i] * row[i]
-            if turns and row[i] * (row[i] + slope * (nodes[0, k] - nodes[0, i])) < 0.0:
-                place, bottom = peak(nodes, row, first, stop, i, k, slope)
-                if bottom * row[i] < 0.0:
-                    j = min(i, k)
-                    down = root(nodes, row, first, stop, nodes[0, j], place, row[j], bottom, 0.0, _ERROR)
-                    up = root(nodes, row, first, stop, place, nodes[0, j + 1], bottom, row[j + 1], 0.0, _ERROR)
-                    start = _integral_to(nodes, integrals, clock, row, first, stop, panel, j, down)
-                    gain += 2.0 * abs(_integral_to(nodes, integrals, clock, row, first, stop, panel, j, up) - start)
-    return gain
+    """What ∫ |values| gains by two changes of sign between the node i and a neighbour of the same sign further out."""
+    slope = weighted(slopes, i, row, first, stop)
+    k = i + 1 if slope * row[i] < 0.0 else i - 1
+    if k < first or k >= stop or row[i] * row[k] < row[i] * row[i]:
+        return 0.0
+    width = nodes[0, k] - nodes[0, i]
+    if row[i] * (row[i] + slope * width) >= 0.0:
+        other = weighted(slopes, k, row, first, stop)
+        if row[i] * (row[k] - other * width) >= 0.0:
+            return 0.0
+    place, bottom = peak(nodes, row, first, stop, i, k, slope)
+    if bottom * row[i] >= 0.0:
+        return 0.0
+    j = min(i, k)
+    down = root(nodes, row, first, stop, nodes[0, j], place, row[j], bottom, 0.0, _ERROR)
+    up = root(nodes, row, first, stop, place, nodes[0, j + 1], bottom, row[j + 1], 0.0, _ERROR)
+    start = _integral_to(nodes, integrals, clock, row, first, stop, panel, j, down)
+    return 2.0 * abs(_integral_to(nodes, integrals, clock, row, first, stop, panel, j, up) - start)
 
 
 @compiled

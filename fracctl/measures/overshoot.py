@@ -43,24 +43,25 @@ class Overshoot:
 
     def __call__(self, trajectory: Trajectory) -> dict[str, Floats]:
         """Return column ``overshoot``, (b,)."""
-        start = trajectory.initial_state[:, : trajectory.positions.shape[1]].T
+        start = trajectory.initial_state[:, : trajectory.positions.shape[1]]
         past = self.definition == "past_equilibrium"
         side = -np.sign(start) if past else np.zeros_like(start)
         if self.resolution is None:
-            largest = largest_excursion(trajectory.grid, trajectory.by_component, side, with_end=past)
+            largest = largest_excursion(trajectory.grid, trajectory.positions, side, with_end=past)
         else:
             largest = self._sampled(trajectory, start, side)
-        return {self.name: 1.0 + self.scale * largest.mean(axis=0)}
+        return {self.name: 1.0 + self.scale * largest.mean(axis=1)}
 
     def _sampled(self, trajectory: Trajectory, start: Floats, side: Floats) -> Floats:
-        """Return the largest samples, (m, b); +inf where there is no trajectory."""
+        """Return the largest samples, (b, m); +inf where there is no trajectory."""
         assert self.resolution is not None
         samples, past = Samples(trajectory.grid, self.resolution), self.definition == "past_equilibrium"
         largest = np.empty_like(start)
-        for i, values in enumerate(trajectory.by_component):
-            whole = samples.largest_excursion(values, start[i], side[i])
-            largest[i] = whole if past else samples.largest_extremum(values, start[i])
-        return np.where(trajectory.missing, np.inf, largest)
+        for i in range(start.shape[1]):
+            values, initial = trajectory.positions[:, i], start[:, i]
+            whole = samples.largest_excursion(values, initial, side[:, i])
+            largest[:, i] = whole if past else samples.largest_extremum(values, initial)
+        return np.where(trajectory.missing[:, None], np.inf, largest)
 
 
 def overshoot(

@@ -33,7 +33,7 @@ class SettlingTime:
 
     def __call__(self, trajectory: Trajectory) -> dict[str, Floats]:
         """Return column ``settling_time``, (b,)."""
-        exact: Floats = last_crossing(trajectory.grid, trajectory.by_component, self.threshold).max(axis=0)
+        exact: Floats = last_crossing(trajectory.grid, trajectory.positions, self.threshold).max(axis=1)
         if self.resolution is None:
             return {self.name: exact}
         return {self.name: self._sampled(trajectory, exact)}
