@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 from numba.core import caching
 
-from fracctl.compiling import compiled
+from fracctl.compiling import compiled, forget_outdated
 
 
 def test_without_a_writable_directory_kernels_are_compiled_all_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -31,3 +33,18 @@ caching.CompileResultCacheImpl._locator_classes = []
 import fracctl.characteristic, fracctl.measures, fracctl.solvers.contour, fracctl.solvers.volterra
 """
     subprocess.run([sys.executable, "-c", code], check=True, timeout=60.0)
+
+
+@pytest.mark.parametrize(("changed", "kept"), [(None, True), ("callee.py", False), ("other.py", True)])
+def test_machine_code_is_forgotten_once_a_kernel_has_changed(tmp_path: Path, changed: str | None, kept: bool) -> None:
+    sources = [tmp_path / name for name in ("caller.py", "callee.py", "other.py")]
+    (tmp_path / "__pycache__").mkdir()
+    stored = [tmp_path / "__pycache__" / f"{name}.kernel-1.py311.nbi" for name in ("caller", "callee")]
+    for age, paths in ((20.0, sources), (10.0, stored)):
+        for path in paths:
+            path.touch()
+            os.utime(path, (path.stat().st_mtime - age,) * 2)
+    if changed:
+        (tmp_path / changed).touch()
+    forget_outdated(tmp_path)
+    assert [path.exists() for path in stored] == [kept, kept]
