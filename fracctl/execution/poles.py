@@ -13,6 +13,7 @@ from fracctl.characteristic import CharacteristicMatrix, principal_poles
 from fracctl.errors import ArgumentError
 from fracctl.evaluation import Evaluation
 from fracctl.stability import PseudoStateVerdict, matignon
+from fracctl.stability.assess import ON_THE_AXIS
 from fracctl.store.columns import SIGMA, W
 
 COLUMNS = ("dominant_pole_real", "dominant_pole_imag", "principal_poles", "all_poles_found")
@@ -20,8 +21,6 @@ COLUMNS = ("dominant_pole_real", "dominant_pole_imag", "principal_poles", "all_p
 TABLE_KINDS = ("overall", "baseline")
 """Optima whose poles are in ``poles.parquet``, and which the pseudo-state matrix judges too."""
 
-_ON_THE_AXIS = 1e-9
-"""|Re σ|/|σ| of a pole whose side is not decided."""
 _Point = tuple[float, ...]
 
 
@@ -83,7 +82,7 @@ class Poles:
         if verdict is not None:
             self._parts.append(_part(run, W, verdict.denominator, verdict.eigenvalues))
             self._compare(row, verdict.stable, f"the pseudo-state matrix finds {verdict.certificate}")
-        if complete and len(poles) and abs(poles[0].real) > _ON_THE_AXIS * abs(poles[0]):
+        if complete and len(poles) and abs(poles[0].real) > ON_THE_AXIS * abs(poles[0]):
             self._compare(row, bool(poles[0].real < 0.0), f"the rightmost pole found is {poles[0]:.6g}")
 
     def _compare(self, row: Mapping[str, Any], stable: bool | None, reason: str) -> None:

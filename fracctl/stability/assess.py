@@ -11,6 +11,9 @@ from fracctl.characteristic.winding import unstable_zeros
 from fracctl.errors import ArgumentError
 from fracctl.loop import ClosedLoop
 
+ON_THE_AXIS = 1e-9
+"""|Re σ|/|σ| of a pole whose side is not decided."""
+
 
 @dataclass(frozen=True)
 class Verdict:
@@ -43,4 +46,6 @@ def assess(loop: ClosedLoop) -> Verdict:
     if marginal[0]:
         return Verdict(None, poles, f"det M vanishes on the imaginary axis; {found}")
     count = int(zeros[0])
+    if count == 0 and len(poles) and poles[0].real > ON_THE_AXIS * abs(poles[0]):
+        return Verdict(False, poles, f"a pole at {poles[0]:.3g}, nearer to the origin than zeros are counted; {found}")
     return Verdict(count == 0, poles, f"{count} zeros of det M with Re σ > 0; {found}")

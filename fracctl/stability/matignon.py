@@ -12,12 +12,10 @@ from fracctl.arrays import Array, Complexes, Floats
 from fracctl.errors import ArgumentError
 from fracctl.fractional.system import LinearFractionalSystem
 from fracctl.loop import ClosedLoop
-from fracctl.stability.assess import Verdict
+from fracctl.stability.assess import ON_THE_AXIS, Verdict
 
 _SAME_ORDER = 1e-9
 """By how much an order may differ from the fraction it is taken for."""
-_ON_THE_AXIS = 1e-9
-"""|Re σ|/|σ| of a pole whose side is not decided; eigenvalues w are right to some 1e-13, σ = w^q to q times that."""
 _ON_THE_CUT = 1e-8
 """Distance of |arg σ| from π below which an eigenvalue is none of the principal sheet."""
 _SINGULAR = 1e-13
@@ -75,7 +73,7 @@ def matignon(loop: ClosedLoop, largest_denominator: int = 100) -> PseudoStateVer
 def _decided(poles: Complexes, at_origin: bool, q: int) -> tuple[bool | None, str]:
     if at_origin:
         return None, "det M vanishes at σ = 0 besides the eigenvalues"
-    if np.any(np.abs(poles.real) <= _ON_THE_AXIS * np.abs(poles)):
+    if np.any(np.abs(poles.real) <= ON_THE_AXIS * np.abs(poles)):
         return None, f"an eigenvalue with |arg w| = π/{2 * q}"
     count = int(np.sum(poles.real > 0.0))
     return count == 0, f"{count} eigenvalues with |arg w| < π/{2 * q}"

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fracctl import stability
-from fracctl.controllers import PDAlpha
+from fracctl.controllers import PDAlpha, PILambdaDMu
 from fracctl.errors import ArgumentError
 from fracctl.loop import ClosedLoop
 from fracctl.plants import HCW, HCWInPlane, HCWOutOfPlane, LinearPlant
@@ -128,3 +128,11 @@ def test_a_slow_and_a_fast_pole() -> None:
     assert "not all" not in verdict.certificate
     member = loops.out_of_plane(0.0, 1e4, 0.5, [1.0, 0.0])
     assert same_set(stability.assess(single(member)).poles, poles.poles(member), 1e-7)
+
+
+@pytest.mark.parametrize("k_i", [-1e-3, -1e-7])
+def test_a_small_negative_integral_gain_is_unstable(k_i: float) -> None:
+    """σ² + k_D σ^μ + 1 + k_P + k_I σ^(-λ) is negative near 0: a zero at σ = (-k_I/(1 + k_P))^(1/λ) or nearby."""
+    verdict = stability.assess(ClosedLoop(HCWOutOfPlane(), PILambdaDMu(0.5, k_i, 1.0, 0.5, 0.9)))
+    assert verdict.stable is False
+    assert verdict.poles[0] == pytest.approx((-k_i / 1.5) ** 2, rel=1e-4)
