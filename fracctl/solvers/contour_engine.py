@@ -29,8 +29,8 @@ from fracctl.solvers.contour_rows import (
 class Start(NamedTuple):
     """The power series on the first panel."""
 
-    nodes: int
-    """Grid nodes of the panel."""
+    numbers: Array
+    """First grid node of the panel, number of grid nodes, and end of the last coefficients among the rows, (3,)."""
     steps: Array
     """Steps of the recursion, see `fracctl.fractional.series.Recipe`."""
     omitted: Floats
@@ -77,7 +77,7 @@ class Members(NamedTuple):
     entries: Floats
     """Coefficients of M̃, (blocks, t LANES)."""
     sources: Floats
-    """Coefficients of r, (blocks, k t' LANES)."""
+    """Coefficients of r, (blocks, k, t' LANES)."""
     feeds: Floats
     """Gains of the recursion, (blocks, entries, LANES)."""
     initial: Floats
@@ -147,7 +147,8 @@ def respond_blocks(
         gains, rows, done = members.gains[block], start.matrix.shape[2], 0
         derivatives = values[: count * rows * width].reshape(count, rows, width)
         _begin(start, members, block, wanted, derivatives, sizes.differences)
-        _finish(derivatives, start.nodes, start.nodes + 3, 0, wanted, gains, place, scratch, sizes, outputs)
+        grid, times, tails = start.numbers
+        _finish(derivatives, times, tails, grid, wanted, gains, place, scratch, sizes, outputs)
         for number in range(len(windows.numbers)):
             first, stop, n, grid, times, rows = windows.numbers[number]
             derivatives = values[: count * rows * width].reshape(count, rows, width)
@@ -267,15 +268,15 @@ def _finish(
     for i in range(len(wanted.stored)):
         rows = values[wanted.stored[i]]
         if i < m:
-            enlarge(sizes.peaks, 0, rows, 0, nodes)
-            enlarge(sizes.tails, 0, rows, nodes, tails)
+            enlarge(sizes.peaks[0], rows[:nodes])
+            enlarge(sizes.tails[0], rows[nodes:tails])
             transpose(rows, nodes, grid, place.first, place.live, outputs.positions, i)
         else:
             transpose(rows, nodes, grid, place.first, place.live, outputs.others, i - m)
     for i in range(m):
         combine(values, wanted.used, gains, i, control)
-        enlarge(sizes.peaks, 1, control, 0, nodes)
-        enlarge(sizes.tails, 1, control, nodes, tails)
+        enlarge(sizes.peaks[1], control[:nodes])
+        enlarge(sizes.tails[1], control[nodes:tails])
         transpose(control, nodes, grid, place.first, place.live, outputs.controls, i)
         for extra in range(tails, len(control)):
             for k in range(len(outputs.controls)):

@@ -33,8 +33,8 @@ class Sums(NamedTuple):
 class Matrix(NamedTuple):
     """How M̃ falls into blocks of coupled coordinates."""
 
-    sizes: Array
-    """Number of coordinates of each block."""
+    blocks: Array
+    """Number of coordinates of each block, the first of them and the first entry, (blocks, 3)."""
     coordinates: Array
     """The coordinates, block by block, (p,)."""
     entries: Sums
@@ -44,19 +44,13 @@ class Matrix(NamedTuple):
 
 
 @compiled
-def _add_up(
-    table: Floats, node: int, sums: Sums, first: int, count: int, coefficients: Floats, start: int, out: Floats, to: int
-) -> None:
-    """Write some sums at a node to out[to PART:], with the coefficients of a start of them.
-
-    The table is (P, C, 2), or (P, C, 2, LANES) if members have exponents of their own.
-    """
-    offset = start * sums.edges[-1]
+def _add_up(table: Floats, node: int, sums: Sums, first: int, count: int, coefficients: Floats, out: Floats) -> None:
+    """Write some sums at a node, from a table (P, C, 2), or (P, C, 2, LANES) if members have exponents of their own."""
     for i in range(count):
-        place = _PART * np.uint64(to + i)
+        place = _PART * np.uint64(i)
         for t in range(sums.edges[first + i], sums.edges[first + i + 1], TERMS):
             begins = t == sums.edges[first + i]
-            at = WIDTH * np.uint64(offset + t)
+            at = WIDTH * np.uint64(t)
             a, b, c = sums.columns[t], sums.columns[t + 1], sums.columns[t + 2]
             if table.ndim == 3:
                 a_re, b_re, c_re = table[node, a, 0], table[node, b, 0], table[node, c, 0]
@@ -105,62 +99,51 @@ def _pair_determinant(m: Floats, det: Floats) -> None:
 
 
 @compiled
-def _solve(size: int, m: Floats, det: Floats, r: Floats, start: int) -> None:
-    """Replace r of a start by the solution for one or two coordinates."""
-    if size == 1:
-        _solve_one(det, r, start)
-    elif size == 2:
-        _solve_pair(m, det, r, start)
-
-
-@compiled
-def _solve_one(det: Floats, r: Floats, start: int) -> None:
+def _solve_one(det: Floats, r: Floats) -> None:
     """Replace r by r / M̃."""
-    at = _PART * np.uint64(start)
     for n in range(WIDTH):
-        x, y, r_re, r_im = det[n], det[_IMAG + n], r[at + n], r[at + _IMAG + n]
+        x, y, r_re, r_im = det[n], det[_IMAG + n], r[n], r[_IMAG + n]
         scale = 1.0 / (x * x + y * y)
-        r[at + n] = (r_re * x + r_im * y) * scale
-        r[at + _IMAG + n] = (r_im * x - r_re * y) * scale
+        r[n] = (r_re * x + r_im * y) * scale
+        r[_IMAG + n] = (r_im * x - r_re * y) * scale
 
 
 @compiled
-def _solve_pair(m: Floats, det: Floats, r: Floats, start: int) -> None:
+def _solve_pair(m: Floats, det: Floats, r: Floats) -> None:
     """Replace r₁, r₂ by the solution, by Cramer's rule."""
-    at = _PART * np.uint64(2 * start)
     for n in range(WIDTH):
         x, y = det[n], det[_IMAG + n]
         scale = 1.0 / (x * x + y * y)
         x, y = x * scale, -y * scale
         a, b, c, d = m[_A + n], m[_B + n], m[_C + n], m[_D + n]
         a_im, b_im, c_im, d_im = m[_A_IM + n], m[_B_IM + n], m[_C_IM + n], m[_D_IM + n]
-        r_re, r_im, s_re, s_im = r[at + _A + n], r[at + _A_IM + n], r[at + _B + n], r[at + _B_IM + n]
+        r_re, r_im, s_re, s_im = r[_A + n], r[_A_IM + n], r[_B + n], r[_B_IM + n]
         re = (d * r_re - d_im * r_im) - (b * s_re - b_im * s_im)
         im = (d * r_im + d_im * r_re) - (b * s_im + b_im * s_re)
-        r[at + _A + n], r[at + _A_IM + n] = re * x - im * y, re * y + im * x
+        r[_A + n], r[_A_IM + n] = re * x - im * y, re * y + im * x
         re = (a * s_re - a_im * s_im) - (c * r_re - c_im * r_im)
         im = (a * s_im + a_im * s_re) - (c * r_im + c_im * r_re)
-        r[at + _B + n], r[at + _B_IM + n] = re * x - im * y, re * y + im * x
+        r[_B + n], r[_B_IM + n] = re * x - im * y, re * y + im * x
 
 
 @compiled
 def _eliminate(size: int, starts: int, m: Floats, det: Floats, r: Floats) -> None:
-    """Determinant of three or more coordinates, and r replaced by the solution, member by member."""
+    """Determinant of three or more coordinates, and r (k, …) replaced by the solutions, member by member."""
     work = np.empty((size, size + starts), np.complex128)
     for n in range(LANES):
         for i in range(size):
+            at = 2 * LANES * i + n
             for j in range(size):
-                at = 2 * LANES * (i * size + j) + n
-                work[i, j] = complex(m[at], m[at + LANES])
+                entry = 2 * LANES * (i * size + j) + n
+                work[i, j] = complex(m[entry], m[entry + LANES])
             for j in range(starts):
-                at = 2 * LANES * (j * size + i) + n
-                work[i, size + j] = complex(r[at], r[at + LANES])
+                work[i, size + j] = complex(r[j, at], r[j, at + LANES])
         product = _reduced(work)
         det[n], det[LANES + n] = product.real, product.imag
         for i in range(size):
+            at = 2 * LANES * i + n
             for j in range(starts):
-                at = 2 * LANES * (j * size + i) + n
-                r[at], r[at + LANES] = work[i, size + j].real, work[i, size + j].imag
+                r[j, at], r[j, at + LANES] = work[i, size + j].real, work[i, size + j].imag
 
 
 @compiled
@@ -169,16 +152,18 @@ def _reduced(work: Complexes) -> complex:
     size, width = work.shape
     product = 1.0 + 0.0j
     for i in range(size):
-        pivot = i + np.argmax(np.abs(work[i:, i]))
-        if pivot != i:
-            product = -product
-            for j in range(i, width):
-                work[i, j], work[pivot, j] = work[pivot, j], work[i, j]
-        product *= work[i, i]
-        work[i, i + 1 :] /= work[i, i]
+        pivot = i
+        for row in range(i + 1, size):
+            pivot = row if abs(work[row, i]) > abs(work[pivot, i]) else pivot
+        product *= work[pivot, i] if pivot == i else -work[pivot, i]
+        inverse = 1.0 / work[pivot, i]
+        for j in range(i, width):
+            work[pivot, j], work[i, j] = work[i, j], work[pivot, j] * inverse
         for row in range(size):
             if row != i:
-                work[row, i + 1 :] -= work[row, i] * work[i, i + 1 :]
+                factor = work[row, i]
+                for j in range(i, width):
+                    work[row, j] -= factor * work[i, j]
     return product
 
 
@@ -200,42 +185,44 @@ def fill(
         table: powers along the contour, (P, C, 2) or (P, C, 2, LANES).
         nodes: N; the first 2N + 1 nodes want solutions.
         coefficients: of the entries, (t LANES,).
-        sources: coefficients of r, one start after the other, (k t' LANES,).
+        sources: coefficients of r from each start, (k, t' LANES).
         odd: out, Z̃ at the odd nodes, (p, 2N, k LANES), real parts first.
         even: out, Z̃ at the even nodes, (p, 2N + 2, k LANES).
         enclosed: set to False for members whose phase turns, (LANES,).
     """
-    largest, starts = max(matrix.sizes), odd.shape[2] // LANES
-    m, r = np.empty(largest * largest * 2 * LANES), np.empty(starts * largest * 2 * LANES)
+    largest, starts = matrix.blocks[:, 0].max(), len(sources)
+    m, r = np.empty(largest * largest * 2 * LANES), np.empty((starts, largest * 2 * LANES))
     det, last, turns = np.empty(2 * LANES), np.empty(2 * LANES), np.empty(2 * LANES)
-    entry = first = 0
-    for size in matrix.sizes:
+    for block in range(len(matrix.blocks)):
+        size, first, entry = matrix.blocks[block]
         last[:LANES], last[LANES:], turns[:] = 1.0, 0.0, 0.0
         for node in range(len(table)):
             wanted = starts if node <= 2 * nodes else 0
-            entries = det if size == 1 else m
-            _add_up(table, node, matrix.entries, entry, size * size, coefficients, 0, entries, 0)
+            _add_up(table, node, matrix.entries, entry, size * size, coefficients, det if size == 1 else m)
             for k in range(wanted):
-                _add_up(table, node, matrix.sources, first, size, sources, k, r, k * size)
+                _add_up(table, node, matrix.sources, first, size, sources[k], r[k])
             if size == 2:
                 _pair_determinant(m, det)
             elif size > 2:
                 _eliminate(size, wanted, m, det, r)
             _follow(det, last, turns)
             for k in range(wanted):
-                _solve(size, m, det, r, k)
-                for i in range(size):
-                    _write(r, k * size + i, odd if node % 2 else even, matrix.coordinates[first + i], node // 2, k)
+                if size == 1:
+                    _solve_one(det, r[k])
+                elif size == 2:
+                    _solve_pair(m, det, r[k])
+                _write(r[k], matrix.coordinates[first : first + size], odd if node % 2 else even, node // 2, k)
         for n in range(LANES):
             enclosed[n] &= turns[n] == 0.0 and turns[LANES + n] == 0.0
-        entry, first = entry + size * size, first + size
 
 
 @compiled
-def _write(solutions: Floats, which: int, out: Floats, coordinate: int, node: int, start: int) -> None:
-    """Write one of the solutions at one node to rows of Z̃, (p, 2N, k LANES)."""
-    at, to, imaginary = _PART * np.uint64(which), WIDTH * np.uint64(start), out.shape[1] // 2 + node
-    for n in range(WIDTH):
-        out[coordinate, node, to + n] = solutions[at + n]
-    for n in range(WIDTH):
-        out[coordinate, imaginary, to + n] = solutions[at + _IMAG + n]
+def _write(solution: Floats, coordinates: Array, out: Floats, node: int, start: int) -> None:
+    """Write the solution of a start at one node to rows of Z̃, (p, 2N, k LANES)."""
+    to, imaginary = WIDTH * np.uint64(start), out.shape[1] // 2 + node
+    for i in range(len(coordinates)):
+        at = _PART * np.uint64(i)
+        for n in range(WIDTH):
+            out[coordinates[i], node, to + n] = solution[at + n]
+        for n in range(WIDTH):
+            out[coordinates[i], imaginary, to + n] = solution[at + _IMAG + n]

@@ -94,7 +94,7 @@ def loops(system: LinearFractionalSystem, y0: Floats, y0_rate: Floats, with_rate
 
     stored = [place(i, 0.0) for i in range(p)] + ([place(i, 1.0) for i in range(m)] if with_rates else [])
     return Loops(
-        Matrix(np.array([len(block) for block in blocks]), np.concatenate(blocks), entries, sources),
+        Matrix(_places([len(block) for block in blocks]), np.concatenate(blocks), entries, sources),
         exponents,
         coefficients,
         np.moveaxis(source_coefficients, 0, 1),
@@ -114,6 +114,12 @@ def loops(system: LinearFractionalSystem, y0: Floats, y0_rate: Floats, with_rate
         np.moveaxis(np.stack([y0, y0_rate]), -1, 1),
         (m, p - m),
     )
+
+
+def _places(sizes: list[int]) -> Array:
+    """Return sizes of blocks, their first coordinates and first entries; see `Matrix.blocks`."""
+    size = np.array(sizes)
+    return np.stack([size, np.cumsum(size) - size, np.cumsum(size**2) - size**2], axis=1)
 
 
 def _sums(parts: list[list[_Power]], exponents: list[Floats], shape: tuple[int, ...]) -> tuple[Sums, Floats]:

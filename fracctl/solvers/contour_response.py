@@ -49,7 +49,7 @@ class _Members:
         self._members = Members(
             table,
             entries.reshape(len(entries), -1),
-            sources.reshape(len(sources), -1),
+            sources.reshape(*sources.shape[:2], -1),
             lanes(loops.feeds, rows),
             initial.reshape(*initial.shape[:3], -1),
             lanes(_growth(loops, plan), rows),

@@ -12,13 +12,14 @@ from fracctl.solvers.contour_lanes import LANES, WIDTH, compiled, larger
 
 
 @compiled
-def enlarge(largest: Floats, which: int, rows: Floats, first: int, stop: int) -> None:
-    """Take the magnitudes of some rows, four at a time, into the largest (s, k LANES) at `which`."""
-    for r in range(first, stop, 4):
-        s, t, u = min(r + 1, stop - 1), min(r + 2, stop - 1), min(r + 3, stop - 1)
-        for n in range(rows.shape[1]):
+def enlarge(largest: Floats, rows: Floats) -> None:
+    """Take the magnitudes of all rows, four at a time, into the largest (k LANES,)."""
+    last = len(rows) - 1
+    for r in range(0, len(rows), 4):
+        s, t, u = min(r + 1, last), min(r + 2, last), min(r + 3, last)
+        for n in range(len(largest)):
             a, b = larger(abs(rows[r, n]), abs(rows[s, n])), larger(abs(rows[t, n]), abs(rows[u, n]))
-            largest[which, n] = larger(largest[which, n], larger(a, b))
+            largest[n] = larger(largest[n], larger(a, b))
 
 
 @compiled

@@ -86,7 +86,8 @@ def _shapes(plan: Plan, exponents: Floats) -> Floats:
 
 
 def _start(plan: Plan, recipe: Recipe, matrix: Floats) -> Start:
-    return Start(plan.grid.panels[0].nodes, recipe.steps, recipe.sizes, np.ascontiguousarray(matrix))
+    nodes = plan.grid.panels[0].nodes
+    return Start(np.array([0, nodes, nodes + 3]), recipe.steps, recipe.sizes, np.ascontiguousarray(matrix))
 
 
 def _start_matrix(plan: Plan, exponents: Floats, orders: Floats) -> Floats:
