@@ -40,6 +40,7 @@ COMPANIONS = {
     "controller=pid_in_plane": ["plant=hcw_in_plane"],
     "controller=pdd_alpha_in_plane": ["plant=hcw_in_plane"],
     "controller=pi_lambda_d_mu_in_plane": ["plant=hcw_in_plane"],
+    "controller=published_in_plane": ["plant=hcw_in_plane"],
     "initial_condition=radial": ["plant=hcw_in_plane", "controller=pdd_alpha_in_plane"],
     "initial_condition=own": ["initial_condition.own.w=1e-3"],
     "objectives=in_plane": ["objective=st_os"],
