@@ -45,6 +45,7 @@ COMPANIONS = {
     "initial_condition=own": ["initial_condition.own.w=1e-3"],
     "objectives=in_plane": ["objective=st_os"],
     "survey=in_plane": ["plant=hcw_in_plane", "controller=pd_alpha_in_plane"],
+    "survey=published_in_plane": ["plant=hcw_in_plane", "controller=pd_alpha_in_plane"],
     "figures=paper_6_to_9": ["initial_condition=[ic1,ic2,ic3]", "objectives=in_plane", "objective=st_os"],
     "figures=paper_2_to_5": ["initial_condition=[ic1,ic2,ic3]", "survey=out_of_plane"],
 }
