@@ -115,5 +115,19 @@ class Solution:
             start, integral = float(self.system.highest[component]) - 1.0, self._integral(component, order)
             inner = exponents > start
             share = self.panels.length / times
-            basis[inner] *= betainc(exponents[inner, None] - start, integral, share) if integral else 0.0
+            basis[inner] *= _share_of_power(exponents[inner, None] - start, integral, share)
         return np.tensordot(merged, basis, axes=(0, 0))
+
+
+def _share_of_power(a: Floats, order: float, share: Floats) -> Floats:
+    """Return B(x; a, μ), which is elementary for the orders μ of integer derivatives."""
+    found: Floats
+    if order == 0.0:
+        found = np.zeros(np.broadcast_shapes(a.shape, share.shape))
+    elif order == 1.0:
+        found = share**a
+    elif order == 2.0:
+        found = share**a * (1.0 + a * (1.0 - share))
+    else:
+        found = betainc(a, order, share)
+    return found
