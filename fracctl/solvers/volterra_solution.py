@@ -125,9 +125,9 @@ def _share_of_power(a: Floats, order: float, share: Floats) -> Floats:
     if order == 0.0:
         found = np.zeros(np.broadcast_shapes(a.shape, share.shape))
     elif order == 1.0:
-        found = share**a
+        found = np.power(share, a)
     elif order == 2.0:
-        found = share**a * (1.0 + a * (1.0 - share))
+        found = np.power(share, a) * (1.0 + a * (1.0 - share))
     else:
         found = betainc(a, order, share)
     return found
