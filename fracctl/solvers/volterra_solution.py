@@ -121,13 +121,7 @@ class Solution:
 
 def _share_of_power(a: Floats, order: float, share: Floats) -> Floats:
     """Return B(x; a, μ), which is elementary for the orders μ of integer derivatives."""
-    found: Floats
-    if order == 0.0:
-        found = np.zeros(np.broadcast_shapes(a.shape, share.shape))
-    elif order == 1.0:
-        found = np.power(share, a)
-    elif order == 2.0:
-        found = np.power(share, a) * (1.0 + a * (1.0 - share))
-    else:
-        found = betainc(a, order, share)
-    return found
+    if order not in (0.0, 1.0, 2.0):
+        return np.asarray(betainc(a, order, share), dtype=np.float64)
+    elementary = (0.0, 1.0, 1.0 + a * (1.0 - share))[int(order)]
+    return np.asarray(share**a * elementary, dtype=np.float64)
