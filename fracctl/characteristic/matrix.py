@@ -86,6 +86,23 @@ class CharacteristicMatrix:
             groups = [group for group in groups if not group & linked] + [linked.union(*joined)]
         return sorted(sorted(group) for group in groups)
 
+    def split(self, block: list[int]) -> tuple[list[int], list[int]]:
+        """Split a block into coordinates and auxiliary states that these determine one by one, as filters and lags do.
+
+        Row and column of such a state hold no other of them, and its own entry is 1 + Σ c σ^e with c ≥ 0 and
+        -1 ≤ e < 0, which has no zeros off the cut: above the real axis no power points up. Blocks of one or two
+        coordinates stay as they are.
+        """
+        found: list[int] = []
+        if len(block) < 3:
+            return block, found
+        for k in (k for k in block if k >= self.system.n_positions):
+            own = self.entries[k][k]
+            lags = own is not None and bool(np.all(own.coefficients >= 0.0) and np.all(own.exponents >= -1.0))
+            if lags and not any(self.entries[k][j] or self.entries[j][k] for j in found):
+                found.append(k)
+        return [i for i in block if i not in found], found
+
     def powers_of(self, block: list[int]) -> Powers:
         """Return the powers of a block."""
         entries = [

@@ -2,6 +2,9 @@
 
 With y = y(0) + z the transform Z of z solves M(σ) Z = r(σ), and M̃ Z̃ = r for Z̃ = σ^ℓ Z. Entries of M̃ and of r are
 sums of powers Σ_t c_t σ^e; complex numbers are stored as LANES real parts, then LANES imaginary parts.
+
+In blocks [[P, Q], [R, D]] with a diagonal D, as filters and lags make them, D is eliminated first: the other
+coordinates solve (P - Q D⁻¹ R) Z̃ = r - Q D⁻¹ r_D, and det M̃ is the determinant of that matrix times det D.
 """
 
 from __future__ import annotations
@@ -34,11 +37,12 @@ class Matrix(NamedTuple):
     """How M̃ falls into blocks of coupled coordinates."""
 
     blocks: Array
-    """Number of coordinates of each block, the first of them and the first entry, (blocks, 3)."""
+    """Of each block: number of coordinates that are kept, of those eliminated first, the first coordinate and the first
+    entry; (blocks, 4)."""
     coordinates: Array
-    """The coordinates, block by block, (p,)."""
+    """The coordinates, block by block, those that are kept before the others, (p,)."""
     entries: Sums
-    """Entries, block by block and row by row."""
+    """Entries, block by block: P row by row, then of each coordinate eliminated its column of Q, its row of R, D."""
     sources: Sums
     """r, in the order of `coordinates`."""
 
@@ -48,6 +52,9 @@ def _add_up(table: Floats, node: int, sums: Sums, first: int, count: int, coeffi
     """Write some sums at a node, from a table (P, C, 2), or (P, C, 2, LANES) if members have exponents of their own."""
     for i in range(count):
         place = _PART * np.uint64(i)
+        if sums.edges[first + i] == sums.edges[first + i + 1]:
+            for n in range(_PART):
+                out[place + n] = 0.0
         for t in range(sums.edges[first + i], sums.edges[first + i + 1], TERMS):
             begins = t == sums.edges[first + i]
             at = WIDTH * np.uint64(t)
@@ -99,6 +106,67 @@ def _pair_determinant(m: Floats, det: Floats) -> None:
 
 
 @compiled
+def _multiply(a: Floats, i: int, b: Floats, j: int) -> None:
+    """Replace a_i by a_i b_j."""
+    at, by = _PART * np.uint64(i), _PART * np.uint64(j)
+    for n in range(WIDTH):
+        x, y, re, im = a[at + n], a[at + _IMAG + n], b[by + n], b[by + _IMAG + n]
+        a[at + n], a[at + _IMAG + n] = x * re - y * im, x * im + y * re
+
+
+@compiled
+def _subtract_product(out: Floats, k: int, a: Floats, i: int, b: Floats, j: int) -> None:
+    """Subtract a_i b_j from out_k."""
+    to, at, by = _PART * np.uint64(k), _PART * np.uint64(i), _PART * np.uint64(j)
+    for n in range(WIDTH):
+        x, y, re, im = a[at + n], a[at + _IMAG + n], b[by + n], b[by + _IMAG + n]
+        out[to + n] -= x * re - y * im
+        out[to + _IMAG + n] -= x * im + y * re
+
+
+@compiled
+def _invert(a: Floats, i: int, product: Floats) -> None:
+    """Multiply the product by a_i and replace a_i by 1 / a_i."""
+    _multiply(product, 0, a, i)
+    at = _PART * np.uint64(i)
+    for n in range(WIDTH):
+        x, y = a[at + n], a[at + _IMAG + n]
+        scale = 1.0 / (x * x + y * y)
+        a[at + n], a[at + _IMAG + n] = x * scale, -y * scale
+
+
+@compiled
+def _eliminate(kept: int, gone: int, edges: Array, entry: int, m: Floats, r: Floats, product: Floats) -> None:
+    """Take P to P - Q D⁻¹ R, R to D⁻¹ R and right-hand sides along with them; multiply D into the product."""
+    for k in range(gone):
+        column = kept * kept + k * (2 * kept + 1)
+        row, diagonal = column + kept, column + 2 * kept
+        _invert(m, diagonal, product)
+        for start in range(len(r)):
+            _multiply(r[start], kept + k, m, diagonal)
+        for j in range(kept):
+            if edges[entry + row + j] < edges[entry + row + j + 1]:
+                _multiply(m, row + j, m, diagonal)
+        for i in range(kept):
+            if edges[entry + column + i] < edges[entry + column + i + 1]:
+                for start in range(len(r)):
+                    _subtract_product(r[start], i, m, column + i, r[start], kept + k)
+                for j in range(kept):
+                    if edges[entry + row + j] < edges[entry + row + j + 1]:
+                        _subtract_product(m, i * kept + j, m, column + i, m, row + j)
+
+
+@compiled
+def _complete(kept: int, gone: int, edges: Array, entry: int, m: Floats, r: Floats) -> None:
+    """Solve for what has been eliminated, from what was kept, for one start."""
+    for k in range(gone):
+        row = kept * kept + k * (2 * kept + 1) + kept
+        for j in range(kept):
+            if edges[entry + row + j] < edges[entry + row + j + 1]:
+                _subtract_product(r, kept + k, m, row + j, r, j)
+
+
+@compiled
 def _solve_one(det: Floats, r: Floats) -> None:
     """Replace r by r / M̃."""
     for n in range(WIDTH):
@@ -127,8 +195,9 @@ def _solve_pair(m: Floats, det: Floats, r: Floats) -> None:
 
 
 @compiled
-def _eliminate(size: int, starts: int, m: Floats, det: Floats, r: Floats) -> None:
+def _solve_many(size: int, m: Floats, det: Floats, r: Floats) -> None:
     """Determinant of three or more coordinates, and r (k, …) replaced by the solutions, member by member."""
+    starts = len(r)
     work = np.empty((size, size + starts), np.complex128)
     for n in range(LANES):
         for i in range(size):
@@ -168,6 +237,29 @@ def _reduced(work: Complexes) -> complex:
 
 
 @compiled
+def _solve(kept: int, gone: int, edges: Array, entry: int, m: Floats, det: Floats, r: Floats) -> None:
+    """Determinant of a block, and r (k, …) replaced by the solutions."""
+    product = np.empty(2 * LANES if gone else 0)
+    if gone:
+        product[:LANES], product[LANES:] = 1.0, 0.0
+        _eliminate(kept, gone, edges, entry, m, r, product)
+    if kept == 1:
+        det[:] = m[: 2 * LANES]
+        for k in range(len(r)):
+            _solve_one(det, r[k])
+    elif kept == 2:
+        _pair_determinant(m, det)
+        for k in range(len(r)):
+            _solve_pair(m, det, r[k])
+    else:
+        _solve_many(kept, m, det, r)
+    if gone:
+        _multiply(det, 0, product, 0)
+        for k in range(len(r)):
+            _complete(kept, gone, edges, entry, m, r[k])
+
+
+@compiled
 def fill(
     matrix: Matrix,
     table: Floats,
@@ -190,28 +282,24 @@ def fill(
         even: out, Z̃ at the even nodes, (p, 2N + 2, k LANES).
         enclosed: set to False for members whose phase turns, (LANES,).
     """
-    largest, starts = matrix.blocks[:, 0].max(), len(sources)
-    m, r = np.empty(largest * largest * 2 * LANES), np.empty((starts, largest * 2 * LANES))
+    kept, gone = matrix.blocks[:, 0], matrix.blocks[:, 1]
+    starts, edges = len(sources), matrix.entries.edges
+    m = np.empty((kept * kept + gone * (2 * kept + 1)).max() * 2 * LANES)
+    r = np.empty((starts, (kept + gone).max() * 2 * LANES))
     det, last, turns = np.empty(2 * LANES), np.empty(2 * LANES), np.empty(2 * LANES)
     for block in range(len(matrix.blocks)):
-        size, first, entry = matrix.blocks[block]
+        size, extra, first, entry = matrix.blocks[block]
+        count = size * size + extra * (2 * size + 1)
         last[:LANES], last[LANES:], turns[:] = 1.0, 0.0, 0.0
         for node in range(len(table)):
             wanted = starts if node <= 2 * nodes else 0
-            _add_up(table, node, matrix.entries, entry, size * size, coefficients, det if size == 1 else m)
+            _add_up(table, node, matrix.entries, entry, count, coefficients, m)
             for k in range(wanted):
-                _add_up(table, node, matrix.sources, first, size, sources[k], r[k])
-            if size == 2:
-                _pair_determinant(m, det)
-            elif size > 2:
-                _eliminate(size, wanted, m, det, r)
+                _add_up(table, node, matrix.sources, first, size + extra, sources[k], r[k])
+            _solve(size, extra, edges, entry, m, det, r[:wanted])
             _follow(det, last, turns)
             for k in range(wanted):
-                if size == 1:
-                    _solve_one(det, r[k])
-                elif size == 2:
-                    _solve_pair(m, det, r[k])
-                _write(r[k], matrix.coordinates[first : first + size], odd if node % 2 else even, node // 2, k)
+                _write(r[k], matrix.coordinates[first : first + size + extra], odd if node % 2 else even, node // 2, k)
         for n in range(LANES):
             enclosed[n] &= turns[n] == 0.0 and turns[LANES + n] == 0.0
 

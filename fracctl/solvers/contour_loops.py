@@ -75,13 +75,13 @@ def loops(system: LinearFractionalSystem, y0: Floats, y0_rate: Floats, with_rate
     b, m, p = system.batch or 1, system.n_positions, system.size
     y0, y0_rate = (np.broadcast_to(v, (len(v), b, p)) for v in (y0, y0_rate))
     matrix = CharacteristicMatrix(system)
-    blocks = matrix.blocks()
+    parts = [matrix.split(block) for block in matrix.blocks()]
+    coordinates = [i for kept, gone in parts for i in kept + gone]
     exponents: list[Floats] = []
-    entries, coefficients = _sums(
-        [_entry(matrix, i, j) for block in blocks for i in block for j in block], exponents, (b,)
-    )
+    places = [place for kept, gone in parts for place in _entries(kept, gone)]
+    entries, coefficients = _sums([_entry(matrix, i, j) for i, j in places], exponents, (b,))
     sources, source_coefficients = _sums(
-        [_source(system, i, y0, y0_rate) for block in blocks for i in block], exponents, y0.shape[:2]
+        [_source(system, i, y0, y0_rate) for i in coordinates], exponents, y0.shape[:2]
     )
     derivatives, used, gains = _derivatives(system, with_rates)
     highest = [float(order) for order in system.highest]
@@ -94,7 +94,7 @@ def loops(system: LinearFractionalSystem, y0: Floats, y0_rate: Floats, with_rate
 
     stored = [place(i, 0.0) for i in range(p)] + ([place(i, 1.0) for i in range(m)] if with_rates else [])
     return Loops(
-        Matrix(_places([len(block) for block in blocks]), np.concatenate(blocks), entries, sources),
+        Matrix(_blocks(parts), np.array(coordinates), entries, sources),
         exponents,
         coefficients,
         np.moveaxis(source_coefficients, 0, 1),
@@ -116,10 +116,17 @@ def loops(system: LinearFractionalSystem, y0: Floats, y0_rate: Floats, with_rate
     )
 
 
-def _places(sizes: list[int]) -> Array:
-    """Return sizes of blocks, their first coordinates and first entries; see `Matrix.blocks`."""
-    size = np.array(sizes)
-    return np.stack([size, np.cumsum(size) - size, np.cumsum(size**2) - size**2], axis=1)
+def _entries(kept: list[int], gone: list[int]) -> list[tuple[int, int]]:
+    """Return rows and columns of the entries of a block, see `Matrix.entries`."""
+    first = [(i, j) for i in kept for j in kept]
+    return first + [place for k in gone for place in [*((i, k) for i in kept), *((k, j) for j in kept), (k, k)]]
+
+
+def _blocks(parts: list[tuple[list[int], list[int]]]) -> Array:
+    """Return the sizes of blocks, their first coordinates and first entries; see `Matrix.blocks`."""
+    kept, gone = np.array([(len(kept), len(gone)) for kept, gone in parts]).T
+    entries = kept**2 + gone * (2 * kept + 1)
+    return np.stack([kept, gone, np.cumsum(kept + gone) - kept - gone, np.cumsum(entries) - entries], axis=1)
 
 
 def _sums(parts: list[list[_Power]], exponents: list[Floats], shape: tuple[int, ...]) -> tuple[Sums, Floats]:
@@ -131,11 +138,12 @@ def _sums(parts: list[list[_Power]], exponents: list[Floats], shape: tuple[int, 
         for coefficient, exponent in part:
             columns.append(_column(exponent, exponents))
             coefficients.append(np.broadcast_to(coefficient, shape))
-        fill = -len(part) % TERMS if part else TERMS
+        fill = -len(part) % TERMS
         columns += [0] * fill
         coefficients += [np.zeros(shape)] * fill
         edges.append(len(columns))
-    return Sums(np.array(columns), np.array(edges)), np.stack(coefficients)
+    values = np.stack(coefficients) if coefficients else np.zeros((0, *shape))
+    return Sums(np.array(columns, dtype=np.int64), np.array(edges)), values
 
 
 def _column(exponent: Floats, exponents: list[Floats]) -> int:
