@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -36,6 +36,20 @@ class ParametrisedLaw(Protocol):
     ) -> LinearLaw | ModelBasedLaw:
         """Build the law from numbers or arrays (b,) by parameter name."""
         ...
+
+
+@dataclass(frozen=True)
+class Conclusion:
+    """What an evaluation makes of all rows of a run."""
+
+    tables: Mapping[str, Sequence[Mapping[str, Any]]] = field(default_factory=dict)
+    """Further tables by name, row by row."""
+    shown: Mapping[str, Sequence[Mapping[str, Any]]] = field(default_factory=dict)
+    """What the summary holds of them."""
+    notes: tuple[str, ...] = ()
+    """Sentences for the summary."""
+    best: tuple[Mapping[str, Any], ...] = ()
+    """Rows that are solved again by the second solver."""
 
 
 @dataclass(frozen=True)
@@ -90,6 +104,14 @@ class Evaluation:
     def findings(self, rows: Mapping[str, Array]) -> list[str]:  # noqa: ARG002 - the optima say it all
         """Return sentences on rows of the table, for the summary."""
         return []
+
+    def by_law(self, rows: Mapping[str, Array]) -> Iterator[tuple[Evaluation, Array]]:
+        """Yield the evaluations whose designs the rows hold, with the places of their rows."""
+        yield self, np.arange(len(rows["initial_condition"]))
+
+    def conclude(self, parts: Iterable[Mapping[str, Array]]) -> Conclusion:  # noqa: ARG002 - the optima say it all
+        """Return what comes out of all rows, which come part by part."""
+        return Conclusion()
 
     def loop(self, design: Mapping[str, Floats | float]) -> ClosedLoop:
         """Return the closed loop, of a batch where `design` holds arrays."""

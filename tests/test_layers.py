@@ -31,6 +31,7 @@ BOTTOM_UP = (
     "evaluation",
     "accuracy",
     "surveys",
+    "comparison",
     "store",
     "config",
     "figures",

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from fracctl.cli import output
+from fracctl.cli.comparison import comparison_lines
 from fracctl.cli.failure import report, sentence
 from fracctl.cli.parser import Parser
 from fracctl.cli.table import ResultTable
@@ -146,11 +147,18 @@ def _show(summary: dict[str, Any], job: _Job, options: argparse.Namespace) -> No
         return
     stored = ", stored already" if summary.get("reused") else ""
     output.say(f"{summary['experiment']}{stored}")
-    for line in _table(job.config).lines(summary):
+    for line in _lines(summary, job.config):
         output.say(line)
     for note in () if options.quiet else summary.get("notes") or ():
         output.say(f"note: {note}")
     output.say(str(summary["run_directory"]))
+
+
+def _lines(summary: dict[str, Any], config: RunConfig) -> list[str]:
+    compared = summary.get("tables", {}).get("comparison")
+    if compared is None:
+        return _table(config).lines(summary)
+    return comparison_lines(compared, config.objectives[config.objective] == ["settling_time"])
 
 
 def _table(config: RunConfig) -> ResultTable:

@@ -9,7 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from fracctl.cli.table import count, number, table
-from fracctl.config.schemas import GridSurvey, RunConfig, SingleSurvey
+from fracctl.comparison import ComparisonEvaluation as ComparisonEvaluated
+from fracctl.config import registry
+from fracctl.config.schemas import ComparisonEvaluation, GridSurvey, RunConfig, SingleSurvey
 from fracctl.evaluation import Evaluation
 from fracctl.plants import Chief, LinearPlant
 from fracctl.store.identity import run_id
@@ -28,7 +30,7 @@ def explain(config: RunConfig, evaluation: Evaluation, survey: Survey) -> list[s
         *_initial_conditions(evaluation),
         ("horizon", _time(evaluation.horizon, evaluation.plant.scales)),
         ("solver", _sentence(evaluation.solver, config.solver.type, _options(config.solver))),
-        ("evaluation", _sentence(evaluation, config.evaluation.type, _options(config.evaluation))),
+        ("evaluation", _sentence(evaluation, config.evaluation.type, _options(config.evaluation, hidden=("laws",)))),
         *_measures(config, evaluation),
         *_objectives(evaluation),
         *_survey(config, evaluation, survey),
@@ -56,6 +58,10 @@ def _plant(config: RunConfig, plant: LinearPlant) -> Iterator[_Row]:
 
 
 def _law(config: RunConfig, evaluation: Evaluation) -> Iterator[_Row]:
+    if isinstance(config.evaluation, ComparisonEvaluation):
+        for place, (name, law) in enumerate(config.evaluation.laws.items()):
+            yield "" if place else "compares", _sentence(registry.load("controllers", law.type), name, "")
+        return
     values = ", ".join(f"{name} = {number(evaluation.parameters[name])}" for name in evaluation.design_variables)
     yield "controller", _sentence(evaluation.law, config.controller.type, "")
     for equation in _equation(evaluation.law):
@@ -82,6 +88,8 @@ def _measures(config: RunConfig, evaluation: Evaluation) -> Iterator[_Row]:
 
 
 def _objectives(evaluation: Evaluation) -> Iterator[_Row]:
+    if isinstance(evaluation, ComparisonEvaluated):
+        yield "minimises", " · ".join(evaluation.factors) + (" (geometric mean)" if len(evaluation.factors) > 1 else "")
     names = sorted(evaluation.objectives, key=lambda name: name != evaluation.objective)
     for place, name in enumerate(names):
         factors = evaluation.objectives[name]
@@ -148,7 +156,7 @@ def _options(options: Any, hidden: Collection[str] = ()) -> str:
 def _option(value: Any) -> str:
     if isinstance(value, Mapping):
         return "(" + ", ".join(f"{name} {_option(entry)}" for name, entry in value.items()) + ")"
-    return f"[{', '.join(map(_option, value))}]" if isinstance(value, list) else number(value)
+    return f"[{', '.join(map(_option, value))}]" if isinstance(value, list | tuple) else number(value)
 
 
 def _time(value: float, scales: Scales | None) -> str:

@@ -14,8 +14,8 @@ from fracctl.config import registry
 from fracctl.config.fields import lines_of, refuse
 from fracctl.config.messages import InvalidConfiguration, problems
 from fracctl.config.options import construct
-from fracctl.config.schemas import AccuracyEvaluation, GridSurvey, RunConfig, SingleSurvey
-from fracctl.errors import ConfigurationError
+from fracctl.config.schemas import AccuracyEvaluation, ComparisonEvaluation, GridSurvey, RunConfig, SingleSurvey
+from fracctl.errors import ArgumentError, ConfigurationError
 from fracctl.evaluation import Evaluation
 from fracctl.plants import LinearPlant
 from fracctl.surveys import Grid, Single, Survey, axis_values
@@ -37,14 +37,32 @@ def build_evaluation(config: RunConfig) -> Evaluation:
 
         options = config.evaluation.model_dump(exclude={"type"})
         return accuracy.AccuracyEvaluation(**common, measures=(), objectives={}, objective="", **options)
+    measures = tuple(construct(registry.load("measures", name), options) for name, options in config.measures.items())
+    if isinstance(config.evaluation, ComparisonEvaluation):
+        return _comparison(config, config.evaluation, common | {"measures": measures})
     return Evaluation(
         **common,
-        measures=tuple(
-            construct(registry.load("measures", name), options) for name, options in config.measures.items()
-        ),
+        measures=measures,
         objectives={name: tuple(columns) for name, columns in config.objectives.items()},
         objective=config.objective,
     )
+
+
+def _comparison(config: RunConfig, given: ComparisonEvaluation, common: Mapping[str, Any]) -> Evaluation:
+    from fracctl import comparison  # loads the laws and the searches
+
+    laws = {
+        name: comparison.ComparedLaw(registry.load("controllers", law.type), law.vary, law.values)
+        for name, law in given.laws.items()
+    }
+    options = {name: value for name, value in given if name not in ("type", "laws")}
+    factors = tuple(config.objectives[config.objective])
+    try:
+        return comparison.ComparisonEvaluation(
+            **common, objectives={}, objective="", factors=factors, laws=laws, **options
+        )
+    except ArgumentError as error:
+        raise ConfigurationError(f"evaluation.{error.name} = {error.value}: {error.allowed}") from error
 
 
 def build_survey(config: RunConfig, evaluation: Evaluation) -> Survey:
@@ -55,6 +73,8 @@ def build_survey(config: RunConfig, evaluation: Evaluation) -> Survey:
     """
     parameters = evaluation.parameters
     survey = config.survey
+    if isinstance(config.evaluation, ComparisonEvaluation) and survey.type != "comparison":
+        raise ConfigurationError(f"survey.type = {survey.type}: must be comparison with evaluation=comparison")
     if isinstance(survey, SingleSurvey) and not evaluation.axes:
         return Single({name: parameters[name] for name in evaluation.design_variables})
     if isinstance(survey, SingleSurvey | GridSurvey):

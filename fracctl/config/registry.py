@@ -54,6 +54,7 @@ BUILT_IN: Mapping[str, Mapping[str, str]] = {
         "pattern_search": "fracctl.surveys:PatternSearchSurvey",
         "continuation": "fracctl.surveys:Continuation",
         "search": "fracctl.surveys:PopulationSearch",
+        "comparison": "fracctl.comparison:Comparison",
     },
     "conf": {},
 }

@@ -11,6 +11,7 @@ from pydantic_core import InitErrorDetails
 
 from fracctl.config import parts
 from fracctl.config.fields import Folder, Name, Number, Strict, Typed, Whole, refusal, refuse
+from fracctl.config.options import factory_of
 from fracctl.errors import suggestion
 
 _COLUMN = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
@@ -56,6 +57,42 @@ class AccuracyEvaluation(Typed):
     """How often it is timed."""
 
 
+class ComparedLaw(Typed):
+    """A law of a comparison."""
+
+    vary: tuple[str, ...] | None = None
+    """Parameters that are searched over; None for all."""
+    values: dict[str, Number] = Field(default_factory=dict)
+    """Values of the others; their defaults where none are given."""
+
+
+def _compared_law(value: ComparedLaw) -> ComparedLaw:
+    factory_of("controllers", value.model_dump())
+    return value
+
+
+class ComparisonEvaluation(Typed):
+    """Several laws on the same problems; goes with the survey of this name."""
+
+    type: Literal["comparison"]
+    laws: Annotated[dict[Name, Annotated[ComparedLaw, AfterValidator(_compared_law)]], Field(min_length=1)]
+    """`type` and options of each law."""
+    reference: str
+    """The law that others are compared with."""
+    thresholds_m: tuple[Number, ...]
+    """Settling bands in metres."""
+    gain_limits: tuple[Number, ...] = ()
+    """Largest gains."""
+    peak_limits_mm_per_s2: tuple[Number, ...] = ()
+    """Peak accelerations, with gains up to `widest_gain`."""
+    widest_gain: Number = 16.0
+    negative_gains: Annotated[bool, Field(strict=True)] = False
+    bounds: dict[str, tuple[Number, Number]] = Field(default_factory=dict)
+    """[lower, upper] of all varied orders, times and weights."""
+    report_periods: tuple[Number, ...] = (2.0, 6.0)
+    """Horizons at which the objective is given."""
+
+
 class SerialScheduler(Typed):
     """Everything in the calling process."""
 
@@ -81,6 +118,8 @@ class Figure(Typed):
         "pareto_fronts",
         "poles",
         "work_precision",
+        "settling_against_band",
+        "settling_against_effort",
     ]
     objective: str | None = None
     """Whose optima are shown; None for the primary one."""
@@ -89,7 +128,11 @@ class Figure(Typed):
 
 
 SURVEYS: Mapping[str, type[Typed]] = {"single": SingleSurvey, "grid": GridSurvey}
-EVALUATIONS: Mapping[str, type[Typed]] = {"performance": PerformanceEvaluation, "accuracy": AccuracyEvaluation}
+EVALUATIONS: Mapping[str, type[Typed]] = {
+    "performance": PerformanceEvaluation,
+    "accuracy": AccuracyEvaluation,
+    "comparison": ComparisonEvaluation,
+}
 SCHEDULERS: Mapping[str, type[Typed]] = {"serial": SerialScheduler, "local": LocalScheduler}
 
 

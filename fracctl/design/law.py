@@ -12,6 +12,7 @@ from fracctl.controllers.layout import component_vector, filled
 from fracctl.controllers.parameters import Parameter
 from fracctl.controllers.pd import PD
 from fracctl.design.lqr import gains_by_name, lqr
+from fracctl.design.regulators import regulators
 from fracctl.plants.linear import LinearPlant
 
 
@@ -39,8 +40,7 @@ class LQR:
         else:
             q, r = (np.atleast_2d(weight) for weight in (self.q, self.r))
             size = max(len(q), len(r))
-            pairs = zip(np.broadcast_to(q, (size, q.shape[1])), np.broadcast_to(r, (size, r.shape[1])), strict=True)
-            gains = np.stack([lqr(plant, *pair) for pair in pairs])
+            gains = regulators(plant, np.broadcast_to(q, (size, q.shape[1])), np.broadcast_to(r, (size, r.shape[1])))
         return PD.from_parameters(plant.components, gains_by_name(plant.components, gains))
 
     @staticmethod

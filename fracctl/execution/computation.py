@@ -12,7 +12,7 @@ import numpy as np
 import pyarrow as pa
 
 from fracctl.errors import RunError
-from fracctl.evaluation import COUNTERS
+from fracctl.evaluation import COUNTERS, Conclusion
 from fracctl.execution.cross_check import CrossCheck
 from fracctl.execution.drawing import draw_figures
 from fracctl.execution.executors import make_executor, n_workers
@@ -22,7 +22,7 @@ from fracctl.execution.progress import Progress
 from fracctl.execution.record import Record, run_log
 from fracctl.execution.row_store import RowStore, evaluations_schema
 from fracctl.execution.scheduler import Scheduler
-from fracctl.execution.summary import Tally, notes_on, results, summarise
+from fracctl.execution.summary import Tally, notes_on, plain_tables, results, summarise
 from fracctl.execution.tails import notes_on_tails
 from fracctl.execution.trajectories import trajectories
 from fracctl.execution.worker import Work, describe
@@ -112,6 +112,7 @@ class Computation:
         store = self._evaluate()
         tally, optima, check, findings = self._tables(store)
         poles = self._write_optima(optima)
+        conclusion = self._conclude(check)
         self._trajectories()
         found = results(self._evaluation, optima)
         notes = self._notes + notes_on(found, self._survey.baseline, tally)
@@ -119,14 +120,15 @@ class Computation:
             notes.append(f"stored parts that could not be trusted and were computed again: {store.damaged}")
         notes += notes_on_tails(self._evaluation, found)
         notes += check.notes()
-        notes += findings
+        notes += [*findings, *conclusion.notes]
         notes += draw_figures(self._directory, self._job.configuration["figures"])
         identity = {
             "experiment": str(self._job.configuration["name"]),
             "run_id": self._directory.path.name,
             "run_directory": str(self._directory.path),
         }
-        return summarise(identity, store, found, notes) | check.summary() | poles.summary()
+        tables = {"tables": plain_tables(conclusion.shown)} if conclusion.shown else {}
+        return summarise(identity, store, found, notes) | tables | check.summary() | poles.summary()
 
     def _evaluate(self) -> RowStore:
         store = RowStore(self._directory, self._evaluation, self._evaluations_schema)
@@ -175,6 +177,15 @@ class Computation:
         rows = poles.rows()
         self._directory.write_poles(schema(tuple(rows), metadata=self._metadata), rows)
         return poles
+
+    def _conclude(self, check: CrossCheck) -> Conclusion:
+        """Store what the evaluation makes of all rows, and check its best points by another solver."""
+        conclusion = self._evaluation.conclude(self._directory.stream_evaluations())
+        check.add_optima(conclusion.best)
+        for name, records in conclusion.tables.items():
+            counts = [column for column, value in records[0].items() if type(value) is int]
+            self._directory.write_table(name, schema(tuple(records[0]), counts, self._metadata), records)
+        return conclusion
 
     def _trajectories(self) -> None:
         optima = self._directory.optima()

@@ -60,8 +60,8 @@ class CrossCheck:
         if self._second is None:
             return
         found = [row for row in optima if row["stable"] is True]
-        names = ("initial_condition", *self.evaluation.design_variables)
-        self._check({name: np.array([row[name] for row in found]) for name in names}, np.arange(len(found)))
+        if found:
+            self._check({name: np.array([row[name] for row in found]) for name in found[0]}, np.arange(len(found)))
 
     def notes(self) -> list[str]:
         """Return a sentence on what came out."""
@@ -83,17 +83,19 @@ class CrossCheck:
 
     def _check(self, rows: Mapping[str, Array], chosen: Array) -> None:
         """Check rows of all initial conditions together: those of equal orders share most of the work."""
-        for start in range(0, len(chosen), _BATCH):
-            part = chosen[start : start + _BATCH]
-            names = rows["initial_condition"][part].tolist()
-            self._compare(names, {name: rows[name][part] for name in self.evaluation.design_variables})
+        for evaluation, places in self.evaluation.by_law(rows):
+            own = np.intersect1d(chosen, places)
+            for start in range(0, len(own), _BATCH):
+                part = own[start : start + _BATCH]
+                names = rows["initial_condition"][part].tolist()
+                self._compare(evaluation, names, {name: rows[name][part] for name in evaluation.design_variables})
 
-    def _compare(self, conditions: Sequence[str], design: Mapping[str, Floats]) -> None:
-        states = np.stack([self.evaluation.initial_conditions[name] for name in conditions])
-        loop = self.evaluation.loop({name: np.asarray(values, dtype=np.float64) for name, values in design.items()})
-        first = self.evaluation.solver.solve(loop, states, self.evaluation.horizon)
+    def _compare(self, evaluation: Evaluation, conditions: Sequence[str], design: Mapping[str, Floats]) -> None:
+        states = np.stack([evaluation.initial_conditions[name] for name in conditions])
+        loop = evaluation.loop({name: np.asarray(values, dtype=np.float64) for name, values in design.items()})
+        first = evaluation.solver.solve(loop, states, evaluation.horizon)
         assert self._second is not None
-        second = self._second.solve(loop, states, self.evaluation.horizon)
+        second = self._second.solve(loop, states, evaluation.horizon)
         difference = _difference(first, second)
         allowed = np.maximum(10.0 * self.evaluation.solver.tolerance, first.error_estimate + second.error_estimate)
         self.rows += len(difference)
@@ -101,7 +103,7 @@ class CrossCheck:
         for i in np.flatnonzero(~(difference <= allowed)).tolist():
             point = ", ".join(f"{name} = {float(values[i]):g}" for name, values in design.items())
             self.disagreements.append(
-                f"{conditions[i]}, {point}: {self.evaluation.solver.name} and {self._second.name} differ by"
+                f"{conditions[int(i)]}, {point}: {self.evaluation.solver.name} and {self._second.name} differ by"
                 f" {difference[i]:.1e} of the peak"
             )
 

@@ -12,7 +12,7 @@ import pyarrow as pa
 from fracctl.arrays import Array
 from fracctl.evaluation import COUNTERS, Evaluation
 from fracctl.execution.worker import Outcome
-from fracctl.store.columns import REASON, schema
+from fracctl.store.columns import REASON, TEXT, schema
 from fracctl.store.parts import Parts
 from fracctl.store.run_directory import RunDirectory
 from fracctl.surveys import Block
@@ -85,7 +85,7 @@ class RowStore:
         names = list(self._evaluation.initial_conditions)
         n_rows = block.size * len(names)
         rows: dict[str, Array] = {name: np.full(n_rows, np.nan) for name in self._evaluation.row_columns}
-        unknown = set(rows) & {"stable", "solver", *COUNTERS}
+        unknown = set(rows) & {"stable", *TEXT, *COUNTERS}
         rows |= {name: np.full(n_rows, None, dtype=object) for name in unknown}
         rows |= {name: np.tile(values, len(names)) for name, values in block.design.items()}
         rows["initial_condition"] = np.repeat(np.array(names, dtype=object), block.size)

@@ -77,6 +77,14 @@ def finite_or_none(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
+def plain_tables(tables: Mapping[str, Sequence[Mapping[str, Any]]]) -> dict[str, list[dict[str, Any]]]:
+    """Return tables as JSON can hold them."""
+    return {
+        name: [{column: finite_or_none(value) for column, value in record.items()} for record in records]
+        for name, records in tables.items()
+    }
+
+
 def _change(optimum: Optimum | None, baseline: Optimum | None, column: str) -> float | None:
     if optimum is None or baseline is None or not baseline[column]:
         return None

@@ -17,6 +17,8 @@ from fracctl.figures import (
     order_contours,
     pareto_fronts,
     poles,
+    settling_against_band,
+    settling_against_effort,
     trajectories,
     work_precision,
 )
@@ -33,6 +35,8 @@ TYPES: Mapping[str, Callable[[Results, Selection], tuple[Figure, pd.DataFrame]]]
     "pareto_fronts": pareto_fronts.build,
     "poles": poles.build,
     "work_precision": work_precision.build,
+    "settling_against_band": settling_against_band.build,
+    "settling_against_effort": settling_against_effort.build,
 }
 """Type in the configuration to the function that makes the figure and the table behind it."""
 

@@ -17,12 +17,18 @@ REASON = "reason"
 SIGMA, W = "sigma", "w"
 """Words of `variable` in ``poles.parquet``: poles σ; eigenvalues w of the pseudo-state matrix, w^denominator = σ."""
 
-_TEXT = ("variable", "initial_condition", "status", REASON, "kind", "objective_name", "solver", SEARCHED_FOR)
+TEXT = (
+    *("variable", "initial_condition", "status", REASON, "kind", "objective_name", "solver", SEARCHED_FOR),
+    *("law", "part", "limit", "verdict", "found_by"),
+)
+"""Columns that hold words."""
 _WHOLE = (POINT, "run", EVALUATIONS_SPENT, "principal_poles", "denominator")
 _FLAGS = ("stable", "all_poles_found")
 _UNITS = {
     "seconds_per_trajectory": "s",
     "_m_per_s": "m/s",
+    "_mm_per_s2": "mm/s²",
+    "threshold_m": "m",
     "_km": "km",
     "_deg": "deg",
     "_percent": "%",
@@ -41,7 +47,7 @@ def schema(
 
 
 def _field(name: str, counters: Collection[str]) -> pa.Field:
-    if name in _TEXT:
+    if name in TEXT:
         return pa.field(name, pa.string())
     if name in _FLAGS:
         return pa.field(name, pa.bool_())

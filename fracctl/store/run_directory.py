@@ -111,6 +111,17 @@ class RunDirectory:
         """Write the trajectories."""
         tables.write(self.trajectories_path, schema, [to_table(rows, schema)])
 
+    def table(self, name: str) -> pd.DataFrame:
+        """Return a further table of the run, ``<name>.parquet``."""
+        return tables.to_pandas(tables.read(self.path / f"{name}.parquet"))
+
+    def write_table(self, name: str, schema: pa.Schema, records: Iterable[Mapping[str, Any]]) -> None:
+        """Write a further table, one mapping a row, as Parquet and as CSV."""
+        table = records_table(records, schema)
+        tables.write(self.path / f"{name}.parquet", schema, [table])
+        text = tables.to_pandas(table).to_csv(index=False, lineterminator="\n")
+        write_bytes(self.path / f"{name}.csv", text.encode())
+
     def write_manifest(self) -> None:
         """Write the digests of all files; from now on the run is finished."""
         manifest.write(self.path)

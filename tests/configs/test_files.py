@@ -47,6 +47,9 @@ COMPANIONS = {
     "survey=in_plane": ["plant=hcw_in_plane", "controller=pd_alpha_in_plane"],
     "survey=published_in_plane": ["plant=hcw_in_plane", "controller=pd_alpha_in_plane"],
     "figures=paper_6_to_9": ["initial_condition=[ic1,ic2,ic3]", "objectives=in_plane", "objective=st_os"],
+    "evaluation=comparison": ["survey=comparison"],
+    "evaluation=comparison_in_plane": ["plant=hcw_in_plane", "controller=pd_in_plane", "survey=comparison"],
+    "survey=comparison": ["evaluation=comparison"],
     "figures=paper_2_to_5": ["initial_condition=[ic1,ic2,ic3]", "survey=out_of_plane"],
 }
 """What an option needs beside it."""
@@ -72,6 +75,8 @@ TINY_CONTINUATION = [
     "survey.steps=[0.5]",
     "scheduler=serial",
 ]
+COMPARISONS = ("fair_inplane", "fair_outofplane")
+"""Experiments with tests of their own, in tests/comparison."""
 SEARCHES = ("ic1_inplane_search", "ic1_inplane_pareto")
 TINY_SEARCH = [
     "survey.bounds.gains=[0,4]",
@@ -132,7 +137,7 @@ def test_a_search_runs_on_a_tiny_budget(name: str, tmp_path: Path) -> None:
     assert {path.stem for path in (result.run_directory / "figures").glob("*.pdf")} == set(config.figures)
 
 
-@pytest.mark.parametrize("name", sorted({*EXPERIMENTS} - {*CONTINUATIONS} - {*SEARCHES}))
+@pytest.mark.parametrize("name", sorted({*EXPERIMENTS} - {*CONTINUATIONS} - {*SEARCHES} - {*COMPARISONS}))
 def test_an_experiment_runs_on_a_tiny_budget(name: str, tmp_path: Path) -> None:
     budget = [] if name in FIXED else [*TINY, *TINY_SETTINGS.get(name, [])]
     config = compose([f"experiment={name}", *budget, f"output_dir={tmp_path}"])

@@ -82,8 +82,8 @@ def test_weights_are_parameters_also_of_a_batch() -> None:
     assert isinstance(law, PD)
     for member, q_v in enumerate((1.0, 9.0)):
         gains = lqr(HCWInPlane(), [1.0, q_v, 1.0, 1.0], [4.0, 1.0])
-        np.testing.assert_array_equal(law.k_p[member], gains[:, :2])
-        np.testing.assert_array_equal(law.k_d[member], gains[:, 2:])
+        np.testing.assert_allclose(law.k_p[member], gains[:, :2], rtol=1e-12)
+        np.testing.assert_allclose(law.k_d[member], gains[:, 2:], rtol=1e-12)
 
 
 def test_names_of_gains() -> None:

@@ -6,7 +6,7 @@ import os
 import signal
 import sys
 import time
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from fracctl.controllers import PDAlpha
+from fracctl.evaluation import Conclusion
 from fracctl.loop import ClosedLoop
 from fracctl.plants import LinearPlant
 from fracctl.solvers import Contour
@@ -97,6 +98,9 @@ class FakeEvaluation:
 
     def loop(self, design: Mapping[str, float]) -> ClosedLoop:
         return ClosedLoop(self.plant, PDAlpha(design["k_p_w"], design["k_d_w"], design["alpha_w"]))
+
+    def conclude(self, parts: Iterable[Mapping[str, Any]]) -> Conclusion:
+        return Conclusion()
 
     def solve(self, design: Mapping[str, float], initial_condition: str, horizon: float = 10.0) -> FakeTrajectory:
         return FakeTrajectory(design["alpha_w"])

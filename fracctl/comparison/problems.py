@@ -1,0 +1,39 @@
+"""The problems that laws are compared on: a settling band and a limit, for each initial condition."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+GAIN, PEAK = "gain", "peak"
+
+
+def objective_within(threshold_m: float) -> str:
+    """Name of the objective with a settling band of δ metres, e.g. ``within_100_m``."""
+    return f"within_{threshold_m:g}_m"
+
+
+def settling_time_within(threshold_m: float) -> str:
+    """Column of the settling time to δ metres, e.g. ``settling_time_within_100_m``."""
+    return f"settling_time_{objective_within(threshold_m)}"
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Every law is optimised anew for each of them."""
+
+    threshold_m: float
+    """Half width δ of the settling band in metres."""
+    limit: Literal["gain", "peak"]
+    """What is limited: the gains themselves, or the peak acceleration with wide bounds on the gains."""
+    value: float
+    """Largest gain, or peak acceleration in mm/s²."""
+
+    @property
+    def objective(self) -> str:
+        """Name of the objective."""
+        return objective_within(self.threshold_m)
+
+    def __str__(self) -> str:
+        """E.g. ``within_100_m/peak/8``."""
+        return f"{self.objective}/{self.limit}/{self.value:g}"
