@@ -90,12 +90,9 @@ class CharacteristicMatrix:
         """Split a block into coordinates and auxiliary states that these determine one by one, as filters and lags do.
 
         Row and column of such a state hold no other of them, and its own entry is 1 + Σ c σ^e with c ≥ 0 and
-        -1 ≤ e < 0, which has no zeros off the cut: above the real axis no power points up. Blocks of one or two
-        coordinates stay as they are.
+        -1 ≤ e < 0, which has no zeros off the cut: above the real axis no power points up.
         """
         found: list[int] = []
-        if len(block) < 3:
-            return block, found
         for k in (k for k in block if k >= self.system.n_positions):
             own = self.entries[k][k]
             lags = own is not None and bool(np.all(own.coefficients >= 0.0) and np.all(own.exponents >= -1.0))

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from fracctl.arrays import Array, Booleans, Complexes, Floats
+from fracctl.characteristic.determinants import determinant, determinants
 from fracctl.compiling import compiled
 
 _LARGEST_CHANGE = 0.5
@@ -31,7 +32,14 @@ _DISC = 0.9
 
 @compiled
 def zeros_to_the_right(
-    coefficients: Floats, exponents: Floats, place: Array, highest: Floats, vanishing: Floats, line: Floats, arc: Floats
+    coefficients: Floats,
+    exponents: Floats,
+    place: Array,
+    highest: Floats,
+    gone: int,
+    vanishing: Floats,
+    line: Floats,
+    arc: Floats,
 ) -> tuple[Floats, Booleans, Booleans]:
     """Count the zeros of a determinant with Re σ > 0.
 
@@ -40,6 +48,7 @@ def zeros_to_the_right(
         exponents: e, (1, K) or (b, K).
         place: row and column of each power, (K, 2).
         highest: ℓ of each column, (p,).
+        gone: how many coordinates, the last ones, hold no other of them.
         vanishing: size below which det M(0) is 0 to rounding, (b,).
         line: log r at the nodes on the imaginary axis, descending from beyond all zeros.
         arc: angles of the nodes after them, with the last r, in right angles, down to 0.
@@ -73,7 +82,7 @@ def zeros_to_the_right(
                 continue
         end = _disc(c, reach, place, sums, 0.0 if integral else _DISC * abs(static), end)
         last = min(end + 1, len(line) - 1) if end < len(line) else nodes - 1
-        _evaluate(c, table, place, last + 1, factor, entries, path)
+        _evaluate(c, table, place, gone, last + 1, factor, entries, path)
         if _is_smooth(path, last, work):
             turns, resolved[i] = _crossings(path, last), True
         else:
@@ -142,7 +151,7 @@ def _at_origin(
         sums[j] = 0.0
         for k in range(len(highest)):
             sums[j] += abs(matrix[j, k].real)
-    return _determinant(matrix).real, integral
+    return determinant(matrix).real, integral
 
 
 @compiled
@@ -186,7 +195,7 @@ def _bound(c: Floats, reach: Floats, place: Array, sums: Floats, n: int) -> floa
 
 @compiled
 def _evaluate(
-    c: Floats, table: Floats, place: Array, count: int, factor: Floats, entries: Floats, path: Floats
+    c: Floats, table: Floats, place: Array, gone: int, count: int, factor: Floats, entries: Floats, path: Floats
 ) -> None:
     """Fill in the function at the first nodes."""
     size = int(np.sqrt(entries.shape[1]))
@@ -199,51 +208,11 @@ def _evaluate(
         for n in range(count):
             entries[0, where, n] += coefficient * table[0, t, n]
             entries[1, where, n] += coefficient * table[1, t, n]
-    _determinants(entries, count, size, path)
+    determinants(entries, count, size, gone, path)
     for n in range(count):
         x, y = path[2, n], path[3, n]
         path[2, n] = x * factor[0, n] - y * factor[1, n]
         path[3, n] = x * factor[1, n] + y * factor[0, n]
-
-
-@compiled
-def _determinants(entries: Floats, count: int, size: int, path: Floats) -> None:
-    """Determinants of matrices given entry by entry, (2, size², nodes)."""
-    re, im = entries
-    if size == 1:
-        for n in range(count):
-            path[2, n], path[3, n] = re[0, n], im[0, n]
-    elif size == 2:
-        for n in range(count):
-            path[2, n] = re[0, n] * re[3, n] - im[0, n] * im[3, n] - re[1, n] * re[2, n] + im[1, n] * im[2, n]
-            path[3, n] = re[0, n] * im[3, n] + im[0, n] * re[3, n] - re[1, n] * im[2, n] - im[1, n] * re[2, n]
-    else:
-        for n in range(count):
-            value = _determinant((re[:, n] + 1j * im[:, n]).reshape(size, size))
-            path[2, n], path[3, n] = value.real, value.imag
-
-
-@compiled
-def _determinant(matrix: Complexes) -> complex:
-    """Determinant of a matrix, by elimination in place."""
-    value, size = 1.0 + 0.0j, len(matrix)
-    for k in range(size):
-        pivot = k
-        for j in range(k + 1, size):
-            if abs(matrix[j, k]) > abs(matrix[pivot, k]):
-                pivot = j
-        if pivot != k:
-            value = -value
-            for m in range(k, size):
-                matrix[k, m], matrix[pivot, m] = matrix[pivot, m], matrix[k, m]
-        value *= matrix[k, k]
-        if matrix[k, k] == 0.0:
-            break
-        for j in range(k + 1, size):
-            share = matrix[j, k] / matrix[k, k]
-            for m in range(k + 1, size):
-                matrix[j, m] -= share * matrix[k, m]
-    return value
 
 
 @compiled
@@ -341,7 +310,7 @@ def _value(function: Any, log_r: float, angle: float, matrix: Complexes) -> tupl
         if place[t, 0] != row:
             largest, total, row = largest * total, 0.0, place[t, 0]
         total += abs(size)
-    value = _determinant(matrix)
+    value = determinant(matrix)
     x, y = _factor(log_r - rho, angle, degree)
     is_noise = abs(value.real) + abs(value.imag) < _ROUNDING * largest * total
     return value.real * x - value.imag * y, value.real * y + value.imag * x, is_noise

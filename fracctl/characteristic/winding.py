@@ -39,9 +39,10 @@ def unstable_zeros(matrix: CharacteristicMatrix, radius: Floats | None = None) -
     zeros, resolved = np.zeros(matrix.batch), np.ones(matrix.batch, dtype=bool)
     row_sums = _static_row_sums(matrix)
     for block in matrix.blocks():
-        powers, vanishing = matrix.powers_of(block), _VANISHING * row_sums[:, block].prod(axis=1)
+        kept, gone = matrix.split(block)
+        powers, vanishing = matrix.powers_of(kept + gone), _VANISHING * row_sums[:, block].prod(axis=1)
         outer = float(np.log(radius.max() * _near_identity(powers, len(block))))
-        found, clear = _counted(powers, matrix.highest[block], vanishing, outer, _INNER)
+        found, clear = _counted(powers, matrix.highest[kept + gone], len(gone), vanishing, outer, _INNER)
         zeros += found
         resolved &= clear
     return np.where(resolved, zeros, np.nan), ~resolved
@@ -57,12 +58,15 @@ def _static_row_sums(matrix: CharacteristicMatrix) -> Floats:
     return sums
 
 
-def _counted(powers: Powers, highest: Floats, vanishing: Floats, outer: float, inner: float) -> tuple[Floats, Booleans]:
+def _counted(
+    powers: Powers, highest: Floats, gone: int, vanishing: Floats, outer: float, inner: float
+) -> tuple[Floats, Booleans]:
     """Count along a path between two logarithms of radii, and along a longer one where it ends too early."""
     line = outer - _STEP * np.arange(-1.0, 2.0 + (outer - inner) / _STEP)
-    zeros, resolved, short = zeros_to_the_right(*powers, highest, vanishing, line, _ARC)
+    zeros, resolved, short = zeros_to_the_right(*powers, highest, gone, vanishing, line, _ARC)
     if short.any() and 2.0 * inner * highest.sum() > _INNERMOST:
-        zeros[short], resolved[short] = _counted(powers.take(short), highest, vanishing[short], outer, 2.0 * inner)
+        rest = powers.take(short)
+        zeros[short], resolved[short] = _counted(rest, highest, gone, vanishing[short], outer, 2.0 * inner)
     return zeros, resolved
 
 

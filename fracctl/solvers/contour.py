@@ -19,9 +19,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from fracctl.arrays import Array, Floats, share
+from fracctl.characteristic.bounds import pole_height
+from fracctl.characteristic.matrix import CharacteristicMatrix
 from fracctl.errors import ArgumentError, UnsupportedError
 from fracctl.solvers.base import Survey
 from fracctl.solvers.batched import BatchSolver
+from fracctl.solvers.contour_lanes import LANES
 from fracctl.solvers.contour_loops import loops
 from fracctl.solvers.contour_plan import make_plan
 from fracctl.solvers.contour_response import responses
@@ -33,18 +36,22 @@ _SERIES_ORDER, _COUPLED_SERIES_ORDER = 6, 5
 """Highest power of time near 0: coupled coordinates have so many powers that a further window is cheaper."""
 
 
+_SPREAD = 2.0
+"""Ratios of pole radius and height within this factor share a contour."""
+
+
 @dataclass(frozen=True)
 class _Attempt:
     """How contours are laid out: wider and with a finer rule each time."""
 
     width: float
-    """Height of the contours over the bound on the poles' imaginary parts, for a single coordinate."""
+    """Height of the contours over the bound on the poles' imaginary parts, for a single position."""
     coupled: float
     """The same for several, where the bound is a norm and generous."""
     safety: float
     """Tolerance of the rule over that of the solver."""
     ratio: float
-    """Pole radii within this factor share a contour."""
+    """Heights within this factor share a contour."""
 
 
 _ATTEMPTS = (_Attempt(1.0, 0.6, 0.05, 1.25), _Attempt(1.1, 1.1, 0.003, 1.5), _Attempt(1.5, 1.5, 0.001, 1.5))
@@ -55,8 +62,12 @@ class _Group:
     """Members that share contours."""
 
     rows: Array
+    height: float
+    """Bound on the imaginary parts of their poles."""
     radius: float
     shift: float
+    mixed: bool
+    """Whether some only fill a block."""
 
 
 class Contour(BatchSolver):
@@ -85,25 +96,33 @@ class Contour(BatchSolver):
     def _solved(self, members: Members, rows: Array, radius: Floats, shift: Floats) -> Iterator[Survey]:
         """Solve `rows`; those that miss the tolerance again, the last time as they come out."""
         cost = np.zeros(len(radius), dtype=np.int64)
-        single = members.system.size == 1
-        order = _SERIES_ORDER if single else _COUPLED_SERIES_ORDER
+        single = members.system.n_positions == 1
+        order = _SERIES_ORDER if members.system.size == 1 else _COUPLED_SERIES_ORDER
+        height = pole_height(CharacteristicMatrix(members.system), radius)
         batch = loops(members.system, members.y0, members.rate, members.every, order)
         for attempt in _ATTEMPTS:
+            last = attempt is _ATTEMPTS[-1]
             missed: list[Array] = []
-            for group in _classes(rows, radius, shift, attempt.ratio):
-                tolerance = max(attempt.safety * self.tolerance, _SMALLEST_TOLERANCE)
+            tolerance = max(attempt.safety * self.tolerance, _SMALLEST_TOLERANCE)
+            bounds = height, radius, shift, attempt.ratio
+            groups = list(_classes(rows, *bounds, fill=not (members.every or last)))
+            while groups:
+                group = groups.pop(0)
                 try:
-                    hull = group.radius * (attempt.width if single else attempt.coupled)
+                    hull = group.height * (attempt.width if single else attempt.coupled)
                     plan = make_plan(members.horizon, hull, group.radius, group.shift, tolerance, order)
                 except UnsupportedError:
                     if members.every:
                         raise
+                    if group.mixed:
+                        groups += _classes(group.rows, *bounds, fill=False)
+                        continue
                     yield without_trajectory(members.take(group.rows), "failed")
                     continue
                 cost[group.rows] += plan.nodes
                 for some, response, enclosed in responses(batch, group.rows, plan):
                     good = enclosed & (response.error.max(axis=0) <= self.tolerance)
-                    done = good if attempt is not _ATTEMPTS[-1] else np.ones_like(good)
+                    done = good if not last else np.ones_like(good)
                     missed.append(some[~done])
                     if done.any():
                         part = members.take(some)
@@ -113,9 +132,24 @@ class Contour(BatchSolver):
                 return
 
 
-def _classes(rows: Array, radius: Floats, shift: Floats, ratio: float) -> Iterator[_Group]:
-    """Split rows by shift and by pole radius, rounded up to powers of `ratio`."""
-    level = np.ceil(np.log(radius[rows]) / np.log(ratio)).astype(int)
-    for a in np.unique(shift[rows]):
-        for k in np.unique(level[shift[rows] == a]):
-            yield _Group(rows[(shift[rows] == a) & (level == k)], float(ratio**k), float(a))
+def _classes(rows: Array, height: Floats, radius: Floats, shift: Floats, ratio: float, fill: bool) -> Iterator[_Group]:
+    """Split rows by shift and by height and radius of their poles, rounded up to powers of `ratio` and of `_SPREAD`.
+
+    Those with the most nodes come first. With `fill`, for members with one shift, the next ones fill the places that
+    they leave empty in a block of members, which costs nothing but the last digits.
+    """
+    level = np.ceil(np.log(height[rows]) / np.log(ratio))
+    spread = np.ceil(np.log(radius[rows] / height[rows]) / np.log(_SPREAD))
+    order = np.lexsort((-spread, -level, shift[rows]))
+    rows, level, spread = rows[order], level[order], spread[order]
+    steps = np.flatnonzero(np.diff(np.stack([shift[rows], level, spread])).any(axis=0)) + 1
+    first = 0
+    while first < len(rows):
+        alike = stop = next((int(step) for step in steps if step > first), len(rows))
+        if fill:
+            stop = min(first + -(-(alike - first) // LANES) * LANES, len(rows))
+        heights = ratio ** level[first:stop]
+        radii = heights * _SPREAD ** spread[first:stop]
+        some = np.sort(rows[first:stop])
+        yield _Group(some, float(heights.max()), float(radii.max()), float(shift[some[0]]), stop > alike)
+        first = stop

@@ -4,7 +4,8 @@ With y = y(0) + z the transform Z of z solves M(σ) Z = r(σ), and M̃ Z̃ = r f
 sums of powers Σ_t c_t σ^e; complex numbers are stored as LANES real parts, then LANES imaginary parts.
 
 In blocks [[P, Q], [R, D]] with a diagonal D, as filters and lags make them, D is eliminated first: the other
-coordinates solve (P - Q D⁻¹ R) Z̃ = r - Q D⁻¹ r_D, and det M̃ is the determinant of that matrix times det D.
+coordinates solve (P - Q D⁻¹ R) Z̃ = r - Q D⁻¹ r_D. The determinant of that matrix has the zeros of det M̃, as D has none
+off the cut, and lies as close to 1 far out: row and column sums of I + N stay below 1 together with those of M̃ - I.
 """
 
 from __future__ import annotations
@@ -125,9 +126,8 @@ def _subtract_product(out: Floats, k: int, a: Floats, i: int, b: Floats, j: int)
 
 
 @compiled
-def _invert(a: Floats, i: int, product: Floats) -> None:
-    """Multiply the product by a_i and replace a_i by 1 / a_i."""
-    _multiply(product, 0, a, i)
+def _invert(a: Floats, i: int) -> None:
+    """Replace a_i by 1 / a_i."""
     at = _PART * np.uint64(i)
     for n in range(WIDTH):
         x, y = a[at + n], a[at + _IMAG + n]
@@ -136,12 +136,12 @@ def _invert(a: Floats, i: int, product: Floats) -> None:
 
 
 @compiled
-def _eliminate(kept: int, gone: int, edges: Array, entry: int, m: Floats, r: Floats, product: Floats) -> None:
-    """Take P to P - Q D⁻¹ R, R to D⁻¹ R and right-hand sides along with them; multiply D into the product."""
+def _eliminate(kept: int, gone: int, edges: Array, entry: int, m: Floats, r: Floats) -> None:
+    """Take P to P - Q D⁻¹ R, R to D⁻¹ R and right-hand sides along with them."""
     for k in range(gone):
         column = kept * kept + k * (2 * kept + 1)
         row, diagonal = column + kept, column + 2 * kept
-        _invert(m, diagonal, product)
+        _invert(m, diagonal)
         for start in range(len(r)):
             _multiply(r[start], kept + k, m, diagonal)
         for j in range(kept):
@@ -238,11 +238,9 @@ def _reduced(work: Complexes) -> complex:
 
 @compiled
 def _solve(kept: int, gone: int, edges: Array, entry: int, m: Floats, det: Floats, r: Floats) -> None:
-    """Determinant of a block, and r (k, …) replaced by the solutions."""
-    product = np.empty(2 * LANES if gone else 0)
+    """Determinant of what is kept of a block, and r (k, …) replaced by the solutions."""
     if gone:
-        product[:LANES], product[LANES:] = 1.0, 0.0
-        _eliminate(kept, gone, edges, entry, m, r, product)
+        _eliminate(kept, gone, edges, entry, m, r)
     if kept == 1:
         det[:] = m[: 2 * LANES]
         for k in range(len(r)):
@@ -254,7 +252,6 @@ def _solve(kept: int, gone: int, edges: Array, entry: int, m: Floats, det: Float
     else:
         _solve_many(kept, m, det, r)
     if gone:
-        _multiply(det, 0, product, 0)
         for k in range(len(r)):
             _complete(kept, gone, edges, entry, m, r[k])
 
@@ -270,7 +267,7 @@ def fill(
     even: Floats,
     enclosed: Booleans,
 ) -> None:
-    """Solve for one block of members at the nodes of one contour, and follow the phase of det M̃ along it.
+    """Solve for one block of members at the nodes of one contour, and follow the phase of determinants along it.
 
     Args:
         matrix: structure of the equations.

@@ -117,3 +117,20 @@ def test_members_of_a_batch_may_share_all_but_one_parameter(varied: int) -> None
     for i, (k_p, k_d, lag) in enumerate(np.broadcast(*values)):
         exact = filtered_pid(*OUT_OF_PLANE, k_p, 0.0, k_d, lag).states(np.array([1e-3, 2e-3]), times)[:, 0]
         assert np.abs(trajectory(times)[i, :, 0] - exact).max() < 1e-8 * np.abs(exact).max()
+
+
+@pytest.mark.parametrize("lag", [1e-2, 1e-4])
+@pytest.mark.parametrize("m", [1, 2])
+def test_fast_lags_cost_a_few_nodes_more(m: int, lag: float) -> None:
+    """Their poles lie near -1/T, far to the left, where contours need no height."""
+    plant, matrices = (HCWOutOfPlane(), OUT_OF_PLANE) if m == 1 else (HCWInPlane(), IN_PLANE)
+    k_p, k_d, start = (0.5, 2.0, [1e-3, 2e-3]) if m == 1 else (K_P, K_D, [1e-3, -2e-3, 5e-4, 2e-3])
+    form, horizon = filtered_pid(*matrices, k_p, 0.0 * np.array(k_p), k_d, lag), 12.0 * np.pi
+    trajectory = Contour().solve(ClosedLoop(plant, PDLag(k_p, k_d, lag)), start, horizon)
+    times = np.concatenate([np.geomspace(0.01 * lag, 1.0, 30), np.linspace(1.1, horizon, 60)])
+    states = form.states(np.array(start), times)
+    controls = states @ form.output.T
+    assert trajectory.status.item() == "ok"
+    assert trajectory.counters["nodes"].item() < 1000
+    assert np.abs(trajectory(times)[:, :m] - states[:, :m]).max() < 1e-8 * np.abs(states[:, :m]).max()
+    assert np.abs(trajectory.control(times) - controls).max() < 1e-8 * np.abs(controls).max()
