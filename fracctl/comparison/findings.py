@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from fracctl.comparison.evaluation import OPEN_LOOP, ComparisonEvaluation
+from fracctl.comparison.problems import MOST_GRID_VARIABLES
 from fracctl.comparison.robustness import HALF_WIDTHS
 from fracctl.comparison.statistics import BETTER, EQUAL, UNDECIDED, WORSE, Ratio, verdict
 
@@ -28,6 +29,9 @@ def findings(comparison: ComparisonEvaluation, records: Sequence[Record]) -> Ite
         yield _against_reference(comparison, name, problems)
     if fractional and integer:
         yield _against_integer(fractional, integer, problems)
+    if searched := [name for name in comparison.laws if len(comparison.law_of(name).varied) > MOST_GRID_VARIABLES]:
+        names = ", ".join(searched)
+        yield f"no grid for {names}, with too many parameters for one: better points than those found may exist"
     best = Counter(min(laws, key=lambda name: _value(laws[name])) for laws in problems.values() if _any(laws))
     counts = ", ".join(f"{name} in {count}" for name, count in best.most_common())
     yield f"best law: {counts} of {len(problems)} problems"

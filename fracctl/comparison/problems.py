@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 GAIN, PEAK = "gain", "peak"
+MOST_GRID_VARIABLES = 3
+"""Laws with more parameters have no grid."""
 
 
 def objective_within(threshold_m: float) -> str:

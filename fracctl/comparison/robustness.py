@@ -22,6 +22,7 @@ AXES, INTERIOR, WORST, HORIZON = "axes", "interior", "worst", "horizon"
 point itself over another horizon."""
 HALF_WIDTHS: Mapping[str, float] = {"gain": 0.05, "order": 0.01, "time": 0.01}
 """Of the box around a best point, by the kind of parameter."""
+_SIMPLE: Mapping[str, float] = {"gain": 0.0, "order": 1.0}
 _ROUNDS = 12
 """Of the search for the worst point."""
 
@@ -117,8 +118,12 @@ class _Table:
 
 
 def boxes(parameters: Sequence[Parameter], points: Floats) -> tuple[Floats, Floats]:
-    """Return lower and upper ends of the boxes around points (p, n), within the ranges of the parameters."""
-    half = np.array([HALF_WIDTHS[p.kind] for p in parameters])
+    """Return lower and upper ends of the boxes around points (p, n), within the ranges of the parameters.
+
+    A gain that is 0 is not built, and a derivative of order 1 is an ordinary one: neither is off.
+    """
+    simple = points == np.array([_SIMPLE.get(p.kind, np.nan) for p in parameters])
+    half = np.where(simple, 0.0, [HALF_WIDTHS[p.kind] for p in parameters])
     least = np.array([p.lower for p in parameters])
     open_ended = np.array([not p.lower_allowed for p in parameters])
     floor = np.where(open_ended, 0.5 * (least + points), least)

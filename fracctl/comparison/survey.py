@@ -12,7 +12,7 @@ from fracctl.arrays import Array, Booleans, Floats
 from fracctl.comparison.bounds import BOUND, CURVE, Case, OpenLoopBounds
 from fracctl.comparison.evaluation import LAW, OPEN_LOOP, PART, ComparisonEvaluation
 from fracctl.comparison.laws import Law, extends
-from fracctl.comparison.problems import PEAK, Problem, settling_time_within
+from fracctl.comparison.problems import MOST_GRID_VARIABLES, PEAK, Problem, settling_time_within
 from fracctl.comparison.robustness import Robustness
 from fracctl.comparison.searches import GRID, SEARCHED, Evolution, GridSearch, Polish
 from fracctl.comparison.selection import Selection
@@ -21,8 +21,6 @@ from fracctl.evaluation import Evaluation
 from fracctl.measures import PeakAcceleration
 from fracctl.surveys.base import SEARCH_COLUMNS, Block, Rows, Search
 
-MOST_GRID_VARIABLES = 3
-"""Laws with more parameters have no grid."""
 SMALLEST_POPULATION = 8
 _GRID_BLOCK = 12_000
 _CURVE_POINTS = 16
@@ -212,7 +210,8 @@ class Comparison:
         selection = Selection(comparison, self._rows())
         for name, condition in itertools.product(comparison.laws, comparison.initial_conditions):
             law = comparison.law_of(name)
-            inner = [other for other in map(comparison.law_of, comparison.laws) if extends(law, other)]
+            below = [other for other in map(comparison.law_of, comparison.laws) if extends(law, other)]
+            inner = [one for one in below if not any(extends(other, one) for other in below)]
             if heights[name] == height and inner and self._polish:
                 for start in (None, *(range(self._starts) if self._has_starts(law) else ())):
                     yield from self._extended(law, inner, condition, start, selection)

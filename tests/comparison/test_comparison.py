@@ -10,8 +10,9 @@ import pandas as pd
 import pytest
 
 from fracctl.comparison import Comparison, ComparisonEvaluation
+from fracctl.comparison.laws import extends
 from fracctl.comparison.problems import Problem
-from fracctl.comparison.robustness import Robustness
+from fracctl.comparison.robustness import Robustness, boxes
 from fracctl.comparison.searches import Evolution
 from fracctl.config.build import build_checked
 from fracctl.config.compose import compose
@@ -77,6 +78,26 @@ def test_a_tighter_band_takes_no_less_time(table: pd.DataFrame) -> None:
     assert (tight >= wide).all()
 
 
+def test_a_law_is_no_worse_than_one_that_it_holds(table: pd.DataFrame) -> None:
+    value = table.set_index(["limit", "threshold_m", "law"])["objective"]
+    for limit, band in table[["limit", "threshold_m"]].drop_duplicates().itertuples(index=False):
+        assert value[limit, band, "pd_alpha"] <= value[limit, band, "pd"] <= value[limit, band, "lqr"]
+        assert value[limit, band, "pid"] <= value[limit, band, "pd_lag"]
+
+
+def test_which_laws_extend_which() -> None:
+    evaluation, _ = comparison_of()
+    laws = [evaluation.law_of(name) for name in LAWS]
+    below = {outer.name: {inner.name for inner in laws if extends(outer, inner)} for outer in laws}
+    assert below == {
+        "pd": {"lqr"},
+        "pd_alpha": {"pd", "lqr"},
+        "pd_lag": {"pd", "lqr"},
+        "pid": {"pd", "pd_lag", "lqr"},
+        "lqr": set(),
+    }
+
+
 def test_no_law_needs_less_than_the_bound_for_rest(table: pd.DataFrame) -> None:
     tight = table[(table["threshold_m"] == 10.0) & (table["law"] != "open_loop")]
     assert (tight["delta_v_m_per_s"] >= tight["least_delta_v_m_per_s"]).all()
@@ -131,6 +152,14 @@ def test_the_worst_near_published_optima(law_and_worst: tuple[str, float]) -> No
     found = dict(zip(rows["part"], rows["objective"], strict=True))
     assert found["worst"] >= max(found["axes"], found["interior"])
     assert found["worst"] / (2.0 * math.pi) == pytest.approx(worst, abs=0.006)
+
+
+def test_what_is_not_built_is_not_off() -> None:
+    evaluation, _ = comparison_of()
+    parameters = list(evaluation.law_of("pd_alpha").parameters.values())
+    lower, upper = boxes(parameters, np.array([[1.0, 0.0, 2.0], [0.995, 0.02, 2.0]]))
+    assert lower == pytest.approx(np.array([[1.0, 0.0, 1.95], [0.985, -0.03, 1.95]]))
+    assert upper == pytest.approx(np.array([[1.0, 0.0, 2.05], [1.0, 0.07, 2.05]]))
 
 
 @pytest.mark.parametrize("workers", [1, 2])
