@@ -215,8 +215,8 @@ def _requests(
         requests.append((component, shared[0], len(shared), -1))
         kernels.append(tuple(float(derivatives[i].order) - top for i in shared))
         for i in mine[len(shared) :]:
-            requests.append((component, i, 1, _column(derivatives[i].order, exponents)))
-            kernels.append((-top,))
+            requests.append((component, i, 1, _column(derivatives[i].order - top, exponents)))
+            kernels.append((0.0,))
     return np.array(requests), tuple(kernels)
 
 

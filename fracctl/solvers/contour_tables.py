@@ -14,8 +14,8 @@ from fracctl.arrays import Array, Floats
 from fracctl.fractional.series import Recipe, differentiated
 from fracctl.fractional.terms import powers
 from fracctl.solvers.contour_engine import Start, Windows
-from fracctl.solvers.contour_lanes import lanes
 from fracctl.solvers.contour_loops import Loops
+from fracctl.solvers.contour_own import own, own_powers, own_shapes, own_start
 from fracctl.solvers.contour_plan import Plan, last_coefficients
 
 
@@ -31,23 +31,20 @@ def tables(plan: Plan, loops: Loops, members: Array) -> tuple[Floats, Start, Win
             _shared_windows(plan, loops.kernels, added),
         )
 
-    def own(orders: list[Floats]) -> Floats:
-        return np.stack([order[members] if order.ndim else np.full(len(members), order) for order in orders])
-
-    recipe, everyone = loops.recipe, np.arange(len(members))
-    kept = list(recipe.exponents[: recipe.kept])
-    matrix = _start_matrix(plan, own(kept), own([wanted.order for wanted in loops.derivatives]))
-    shapes = lanes(_shapes(plan, own(loops.powers)), everyone)
+    kept = list(loops.recipe.exponents[: loops.recipe.kept])
+    shapes = own_shapes(plan, own(loops.powers, members))
+    matrix = own_start(plan, own(kept, members), own([wanted.order for wanted in loops.derivatives], members))
     return (
-        lanes(_powers(plan, own(loops.exponents)), everyone),
-        _start(plan, recipe, lanes(matrix, everyone)),
+        own_powers(plan, loops.exponents, members),
+        _start(plan, loops.recipe, matrix),
         _shared_windows(plan, loops.kernels, ())._replace(shapes=shapes),
     )
 
 
 @lru_cache(maxsize=64)
 def _shared_powers(plan: Plan, exponents: tuple[float, ...]) -> Floats:
-    return np.ascontiguousarray(_powers(plan, np.array(exponents))[None])
+    values = powers(plan.path, np.array(exponents))
+    return np.ascontiguousarray(np.moveaxis(np.stack([values.real, values.imag], axis=1), -1, 0)[None])
 
 
 @lru_cache(maxsize=64)
@@ -70,19 +67,13 @@ def _shared_windows(plan: Plan, exponents: tuple[tuple[float, ...], ...], added:
     return Windows(np.array(numbers), checked, flat, places, np.ascontiguousarray(_shapes(plan, np.array(added))[None]))
 
 
-def _powers(plan: Plan, exponents: Floats) -> Floats:
-    """Return powers along the path for exponents (C,) or (C, b), (P, C, 2) or (P, C, 2, b)."""
-    values = powers(plan.path, exponents)
-    return np.moveaxis(np.stack([values.real, values.imag], axis=1), -1, 0)
-
-
 def _shapes(plan: Plan, exponents: Floats) -> Floats:
-    """Return rows of t^p / Γ(p + 1) on all windows for exponents (w,) or (w, b), (w, rows) or (w, rows, b)."""
+    """Return rows of t^p / Γ(p + 1) on all windows for exponents (w,), (w, rows)."""
     parts: list[Floats] = []
     for window in plan.windows:
-        values = window.times.reshape(-1, *[1] * exponents.ndim) ** exponents * rgamma(exponents + 1.0)
-        parts += [values, np.tensordot(window.last, values, axes=1)]
-    return np.moveaxis(np.concatenate(parts), 0, 1)
+        values = window.times[:, None] ** exponents * rgamma(exponents + 1.0)
+        parts += [values, window.last @ values]
+    return np.concatenate(parts).T
 
 
 def _start(plan: Plan, recipe: Recipe, matrix: Floats) -> Start:
@@ -91,15 +82,15 @@ def _start(plan: Plan, recipe: Recipe, matrix: Floats) -> Start:
 
 
 def _start_matrix(plan: Plan, exponents: Floats, orders: Floats) -> Floats:
-    """Return the matrix from powers (E,) or (E, b) to rows of derivatives (w,) or (w, b) on the first panel.
+    """Return the matrix from powers (E,) to rows of derivatives (w,) on the first panel, (w, rows, E).
 
-    It is (w, rows, E) or (w, rows, E, b); the last row is the value at 0+.
+    The last row is the value at 0+.
     """
     nodes = plan.grid.panels[0].nodes
     last, times = last_coefficients(plan.grid, slice(0, nodes)), np.append(plan.grid.times[:nodes], 0.0)
     matrices = []
     for order in orders:
         with np.errstate(divide="ignore", invalid="ignore"):
-            values = np.moveaxis(differentiated(exponents, order, times), -1, 0)
-        matrices.append(np.concatenate([values[:nodes], np.tensordot(last, values[:nodes], axes=1), values[nodes:]]))
+            values = differentiated(exponents, order, times).T
+        matrices.append(np.concatenate([values[:nodes], last @ values[:nodes], values[nodes:]]))
     return np.stack(matrices)
