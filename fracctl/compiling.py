@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
@@ -12,15 +13,16 @@ _Function = TypeVar("_Function", bound=Callable[..., Any])
 
 
 def forget_outdated(package: Path) -> None:
-    """Remove the machine code beside the modules of a package if any module with kernels is newer.
+    """Remove the machine code beside the modules of a package if any module with kernels or helpers is newer.
 
     numba compiles a kernel again when its own module has changed, but not when one that it calls has.
     """
     try:
         stored = list(package.rglob("__pycache__/*.nbi"))
-        modules = {path.parents[1] / f"{path.name.partition('.')[0]}.py" for path in stored}
-        newest = max((path.stat().st_mtime for path in modules if path.exists()), default=0.0)
-        if any(path.stat().st_mtime < newest for path in stored):
+        oldest = min((path.stat().st_mtime for path in stored), default=math.inf)
+        kernels = {path.parents[1] / f"{path.name.partition('.')[0]}.py" for path in stored}
+        newer = [path for path in package.rglob("*.py") if path.stat().st_mtime > oldest]
+        if any(path in kernels or "compiling import" in path.read_text() for path in newer):
             for path in stored:
                 path.unlink(missing_ok=True)
     except OSError:
@@ -48,5 +50,26 @@ def compiled_with(**options: Any) -> Callable[[_Function], _Function]:
     return decorate
 
 
-compiled = compiled_with(error_model="numpy", fastmath={"reassoc", "contract", "nsz", "arcp"})
-"""The decorator of arithmetic that may be reordered and divides by zero as NumPy does."""
+def helper_with(**options: Any) -> Callable[[_Function], _Function]:
+    """Return a decorator for functions that only compiled functions call, with some options of `numba.njit`.
+
+    They are compiled and kept as parts of those: entries for Python would take a third more time to compile. To call
+    one from Python is a crash.
+    """
+    options |= {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+
+    def decorate(function: _Function) -> _Function:
+        kernel: _Function = numba.njit(**options)(function)
+        return kernel
+
+    return decorate
+
+
+_ARITHMETIC: dict[str, Any] = {"error_model": "numpy", "fastmath": {"reassoc", "contract", "nsz", "arcp"}}
+"""Arithmetic that may be reordered and divides by zero as NumPy does."""
+compiled = compiled_with(**_ARITHMETIC)
+"""The decorator of kernels."""
+helper = helper_with(**_ARITHMETIC)
+"""The decorator of functions that only kernels call."""
+inlined = helper_with(**_ARITHMETIC, inline="always")
+"""The same for a function that is called at one place, which then is not compiled apart; without branches on ndim."""

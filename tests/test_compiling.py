@@ -35,14 +35,16 @@ import fracctl.characteristic, fracctl.measures, fracctl.solvers.contour, fracct
     subprocess.run([sys.executable, "-c", code], check=True, timeout=60.0)
 
 
-@pytest.mark.parametrize(("changed", "kept"), [(None, True), ("callee.py", False), ("other.py", True)])
+@pytest.mark.parametrize(
+    ("changed", "kept"), [(None, True), ("callee.py", False), ("other.py", True), ("helpers.py", False)]
+)
 def test_machine_code_is_forgotten_once_a_kernel_has_changed(tmp_path: Path, changed: str | None, kept: bool) -> None:
-    sources = [tmp_path / name for name in ("caller.py", "callee.py", "other.py")]
+    sources = [tmp_path / name for name in ("caller.py", "callee.py", "other.py", "helpers.py")]
     (tmp_path / "__pycache__").mkdir()
     stored = [tmp_path / "__pycache__" / f"{name}.kernel-1.py311.nbi" for name in ("caller", "callee")]
     for age, paths in ((20.0, sources), (10.0, stored)):
         for path in paths:
-            path.touch()
+            path.write_text("from fracctl.compiling import helper" if path.name == "helpers.py" else "")
             os.utime(path, (path.stat().st_mtime - age,) * 2)
     if changed:
         (tmp_path / changed).touch()

@@ -13,8 +13,9 @@ from typing import NamedTuple
 import numpy as np
 
 from fracctl.arrays import Array, Booleans, Floats
+from fracctl.compiling import compiled, inlined
 from fracctl.solvers.contour_fill import Matrix, fill
-from fracctl.solvers.contour_lanes import LANES, compiled, larger
+from fracctl.solvers.contour_lanes import LANES, larger
 from fracctl.solvers.contour_rows import (
     add_shapes,
     combine,
@@ -134,61 +135,58 @@ def respond_blocks(
     """Fill in the outputs of some blocks of members."""
     starts, size = len(outputs.controls), len(matrix.coordinates)
     width, count = starts * LANES, len(wanted.components)
-    most, nodes = max(windows.numbers[:, 5].max(), start.matrix.shape[2]), windows.numbers[:, 2].max()
-    odd, even = np.empty(size * 2 * nodes * width), np.empty(size * 2 * (nodes + 1) * width)
+    most, nodes = start.matrix.shape[2], 0
+    for number in range(len(windows.numbers)):
+        most, nodes = max(most, windows.numbers[number, 5]), max(nodes, windows.numbers[number, 2])
+    odd_work, even_work = np.empty(size * 2 * nodes * width), np.empty(size * 2 * (nodes + 1) * width)
     values, scratch = np.empty(count * most * width), np.empty((max(most, 2 * nodes + 2), width))
     sizes = _Sizes(np.empty((2, width)), np.empty((2, width)), np.empty((count, width)))
+    gaps, enclosed = np.empty((count * windows.checked.shape[1], width)), np.empty(LANES, np.bool_)
     for member in range(0, len(outputs.enclosed), LANES):
-        for part in sizes:
-            part[:] = 0.0
-        block, enclosed = first_block + member // LANES, np.ones(LANES, np.bool_)
+        sizes.peaks[:], sizes.tails[:], sizes.differences[:] = 0.0, 0.0, 0.0
+        enclosed[:] = True
+        block = first_block + member // LANES
         place = _Place(member, min(LANES, len(outputs.enclosed) - member))
         table, shapes = _own(members.table, block), _own(windows.shapes, block)
-        gains, rows, done = members.gains[block], start.matrix.shape[2], 0
-        derivatives = values[: count * rows * width].reshape(count, rows, width)
-        _begin(start, members, block, wanted, derivatives, sizes.differences)
-        grid, times, tails = start.numbers
-        _finish(derivatives, times, tails, grid, wanted, gains, place, scratch, sizes, outputs)
-        for number in range(len(windows.numbers)):
-            first, stop, n, grid, times, rows = windows.numbers[number]
+        gains, done = members.gains[block], 0
+        for number in range(-1, len(windows.numbers)):
+            first, stop, n, grid, times, rows = windows.numbers[max(number, 0)]
+            tails = rows
+            if number < 0:
+                grid, times, tails = start.numbers
+                rows = start.matrix.shape[2]
             derivatives = values[: count * rows * width].reshape(count, rows, width)
-            halves = (
-                odd[: size * 2 * n * width].reshape(size, 2 * n, width),
-                even[: size * 2 * (n + 1) * width].reshape(size, 2 * (n + 1), width),
-            )
-            path = table[first:stop]
-            fill(matrix, path, n, members.entries[block], members.sources[block], halves[0], halves[1], enclosed)
-            _multiply(windows, number, wanted, path, halves, derivatives, scratch, sizes.differences)
-            for w in range(count):
-                add_shapes(derivatives[w], shapes[w, done : done + rows], members.added[block, w])
-            _finish(derivatives, times, rows, grid, wanted, gains, place, scratch, sizes, outputs)
-            done += rows
-        outputs.enclosed[place.first : place.first + place.live] = enclosed[: place.live]
+            if number < 0:
+                _begin(start, members, block, wanted, derivatives, sizes.differences)
+            else:
+                odd = odd_work[: size * 2 * n * width].reshape(size, 2 * n, width)
+                even = even_work[: size * 2 * (n + 1) * width].reshape(size, 2 * (n + 1), width)
+                path = table[first:stop]
+                fill(matrix, path, n, members.entries[block], members.sources[block], odd, even, enclosed)
+                _multiply(windows, number, wanted, path, (odd, even), derivatives, scratch, gaps, sizes.differences)
+                for w in range(count):
+                    add_shapes(derivatives[w], shapes[w, done : done + rows], members.added[block, w])
+                done += rows
+            _finish(derivatives, times, tails, grid, wanted, gains, place, scratch, sizes, outputs)
+        for n in range(place.live):
+            outputs.enclosed[member + n] = enclosed[n]
         _conclude(wanted, gains, place, sizes, outputs)
 
 
-@compiled
+@inlined
 def _own(parts: Floats, block: int) -> Floats:
     """Return what belongs to a block: its own, or the only one there is."""
     own: Floats = parts[min(block, len(parts) - 1)]
     return own
 
 
-@compiled
+@inlined
 def _begin(start: Start, members: Members, block: int, wanted: Wanted, values: Floats, differences: Floats) -> None:
     """Fill in rows of all derivatives on the first panel, (w, r, k LANES), and their remainders (w, k LANES)."""
-    initial, feeds = members.initial[block], members.feeds[block]
     matrix = _own(start.matrix, block)
-    kept, width = matrix.shape[2], initial.shape[2]
-    coefficients = np.zeros((initial.shape[1], kept + len(start.omitted), width))
-    coefficients[:, 0], coefficients[:, 1] = initial[0], initial[1]
-    for step in range(len(start.steps)):
-        target, source, row, column, entry = start.steps[step]
-        gain = feeds[entry]
-        for at in range(0, width, LANES):
-            to, by = coefficients[row, target, at : at + LANES], coefficients[column, source, at : at + LANES]
-            for n in range(LANES):
-                to[n] -= gain[n] * by[n]
+    kept, width = matrix.shape[2], members.initial.shape[3]
+    coefficients = np.zeros((members.initial.shape[2], kept + len(start.omitted), width))
+    _run(start.steps, members.feeds[block], members.initial[block], coefficients)
     remainder = np.zeros(width)
     for i in range(len(coefficients)):
         for e in range(len(start.omitted)):
@@ -202,7 +200,21 @@ def _begin(start: Start, members: Members, block: int, wanted: Wanted, values: F
             differences[w, n] = remainder[n] * growth[n % LANES]
 
 
-@compiled
+@inlined
+def _run(steps: Array, feeds: Floats, initial: Floats, coefficients: Floats) -> None:
+    """Run the recursion on coefficients of powers, (p, E, k LANES), from y(0) and y'(0)."""
+    for part in range(2):
+        for i in range(len(coefficients)):
+            for n in range(coefficients.shape[2]):
+                coefficients[i, part, n] = initial[part, i, n]
+    for step in range(len(steps)):
+        target, source, row, column, entry = steps[step]
+        for at in range(0, coefficients.shape[2], LANES):
+            for n in range(LANES):
+                coefficients[row, target, at + n] -= feeds[entry, n] * coefficients[column, source, at + n]
+
+
+@inlined
 def _multiply(
     windows: Windows,
     number: int,
@@ -211,6 +223,7 @@ def _multiply(
     halves: tuple[Floats, Floats],
     values: Floats,
     scratch: Floats,
+    gaps: Floats,
     differences: Floats,
 ) -> None:
     """Take transforms at odd nodes to rows of derivatives, (w, r, k LANES), and compare with even nodes."""
@@ -231,13 +244,14 @@ def _multiply(
             times_powers(other, path, 0, column, scratch[: len(other)])
             other = scratch[: len(other)]
         at = windows.places[request, number, 1]
-        kernel = windows.kernels[at : at + count * len(checked) * len(other)].reshape(-1, len(other))
-        compared = np.dot(kernel, other)
+        kernel = windows.kernels[at : at + count * len(checked) * len(other)].reshape(count * len(checked), len(other))
+        compared = gaps[: len(kernel)]
+        np.dot(kernel, other, compared)
         for w in range(count):
             enlarge_by_gaps(differences, first + w, values, checked, compared, w * len(checked))
 
 
-@compiled
+@inlined
 def _finish(
     values: Floats,
     nodes: int,
@@ -284,7 +298,7 @@ def _finish(
                     outputs.initial_controls[k, place.first + n, i] = control[extra, k * LANES + n]
 
 
-@compiled
+@inlined
 def _conclude(wanted: Wanted, gains: Floats, place: _Place, sizes: _Sizes, outputs: Outputs) -> None:
     """Write peaks and errors of a block."""
     m = len(gains)

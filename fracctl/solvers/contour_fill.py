@@ -15,7 +15,8 @@ from typing import NamedTuple
 import numpy as np
 
 from fracctl.arrays import Array, Booleans, Complexes, Floats
-from fracctl.solvers.contour_lanes import LANES, WIDTH, compiled
+from fracctl.compiling import helper, inlined
+from fracctl.solvers.contour_lanes import LANES, WIDTH
 
 TERMS = 3
 """Terms of a sum that are added at once; sums are filled up with zeros to a multiple."""
@@ -46,9 +47,12 @@ class Matrix(NamedTuple):
     """Entries, block by block: P row by row, then of each coordinate eliminated its column of Q, its row of R, D."""
     sources: Sums
     """r, in the order of `coordinates`."""
+    edges: Array | None
+    """Those of `entries`; None where no block has coordinates to eliminate or more than two others. What only these
+    need is then not compiled."""
 
 
-@compiled
+@helper
 def _add_up(table: Floats, node: int, sums: Sums, first: int, count: int, coefficients: Floats, out: Floats) -> None:
     """Write some sums at a node, from a table (P, C, 2), or (P, C, 2, LANES) if members have exponents of their own."""
     for i in range(count):
@@ -82,7 +86,7 @@ def _add_up(table: Floats, node: int, sums: Sums, first: int, count: int, coeffi
                     out[place + _IMAG + n] = im if begins else out[place + _IMAG + n] + im
 
 
-@compiled
+@inlined
 def _follow(value: Floats, last: Floats, turns: Floats) -> None:
     """Count crossings of the negative real axis since the `last` value, and steps of a right angle or more.
 
@@ -96,7 +100,7 @@ def _follow(value: Floats, last: Floats, turns: Floats) -> None:
         last[n], last[_IMAG + n] = x, y
 
 
-@compiled
+@inlined
 def _pair_determinant(m: Floats, det: Floats) -> None:
     """Determinant of M̃₁₁, M̃₁₂, M̃₂₁, M̃₂₂."""
     for n in range(WIDTH):
@@ -106,7 +110,7 @@ def _pair_determinant(m: Floats, det: Floats) -> None:
         det[_IMAG + n] = (a * d_im + a_im * d) - (b * c_im + b_im * c)
 
 
-@compiled
+@helper
 def _multiply(a: Floats, i: int, b: Floats, j: int) -> None:
     """Replace a_i by a_i b_j."""
     at, by = _PART * np.uint64(i), _PART * np.uint64(j)
@@ -115,7 +119,7 @@ def _multiply(a: Floats, i: int, b: Floats, j: int) -> None:
         a[at + n], a[at + _IMAG + n] = x * re - y * im, x * im + y * re
 
 
-@compiled
+@helper
 def _subtract_product(out: Floats, k: int, a: Floats, i: int, b: Floats, j: int) -> None:
     """Subtract a_i b_j from out_k."""
     to, at, by = _PART * np.uint64(k), _PART * np.uint64(i), _PART * np.uint64(j)
@@ -125,7 +129,7 @@ def _subtract_product(out: Floats, k: int, a: Floats, i: int, b: Floats, j: int)
         out[to + _IMAG + n] -= x * im + y * re
 
 
-@compiled
+@helper
 def _invert(a: Floats, i: int) -> None:
     """Replace a_i by 1 / a_i."""
     at = _PART * np.uint64(i)
@@ -135,7 +139,7 @@ def _invert(a: Floats, i: int) -> None:
         a[at + n], a[at + _IMAG + n] = x * scale, -y * scale
 
 
-@compiled
+@helper
 def _eliminate(kept: int, gone: int, edges: Array, entry: int, m: Floats, r: Floats) -> None:
     """Take P to P - Q D⁻¹ R, R to D⁻¹ R and right-hand sides along with them."""
     for k in range(gone):
@@ -156,7 +160,7 @@ def _eliminate(kept: int, gone: int, edges: Array, entry: int, m: Floats, r: Flo
                         _subtract_product(m, i * kept + j, m, column + i, m, row + j)
 
 
-@compiled
+@inlined
 def _complete(kept: int, gone: int, edges: Array, entry: int, m: Floats, r: Floats) -> None:
     """Solve for what has been eliminated, from what was kept, for one start."""
     for k in range(gone):
@@ -166,7 +170,7 @@ def _complete(kept: int, gone: int, edges: Array, entry: int, m: Floats, r: Floa
                 _subtract_product(r, kept + k, m, row + j, r, j)
 
 
-@compiled
+@inlined
 def _solve_one(det: Floats, r: Floats) -> None:
     """Replace r by r / M̃."""
     for n in range(WIDTH):
@@ -176,7 +180,7 @@ def _solve_one(det: Floats, r: Floats) -> None:
         r[_IMAG + n] = (r_im * x - r_re * y) * scale
 
 
-@compiled
+@inlined
 def _solve_pair(m: Floats, det: Floats, r: Floats) -> None:
     """Replace r₁, r₂ by the solution, by Cramer's rule."""
     for n in range(WIDTH):
@@ -194,7 +198,7 @@ def _solve_pair(m: Floats, det: Floats, r: Floats) -> None:
         r[_B + n], r[_B_IM + n] = re * x - im * y, re * y + im * x
 
 
-@compiled
+@helper
 def _solve_many(size: int, m: Floats, det: Floats, r: Floats) -> None:
     """Determinant of three or more coordinates, and r (k, …) replaced by the solutions, member by member."""
     starts = len(r)
@@ -215,7 +219,7 @@ def _solve_many(size: int, m: Floats, det: Floats, r: Floats) -> None:
                 r[j, at], r[j, at + LANES] = work[i, size + j].real, work[i, size + j].imag
 
 
-@compiled
+@helper
 def _reduced(work: Complexes) -> complex:
     """Turn a matrix and right-hand sides (s, s + k) into unit matrix and solutions; return the determinant."""
     size, width = work.shape
@@ -236,27 +240,28 @@ def _reduced(work: Complexes) -> complex:
     return product
 
 
-@compiled
-def _solve(kept: int, gone: int, edges: Array, entry: int, m: Floats, det: Floats, r: Floats) -> None:
+@helper
+def _solve(kept: int, gone: int, edges: Array | None, entry: int, m: Floats, det: Floats, r: Floats) -> None:
     """Determinant of what is kept of a block, and r (k, …) replaced by the solutions."""
-    if gone:
+    if edges is not None:
         _eliminate(kept, gone, edges, entry, m, r)
     if kept == 1:
-        det[:] = m[: 2 * LANES]
+        for n in range(_PART):
+            det[n] = m[n]
         for k in range(len(r)):
             _solve_one(det, r[k])
     elif kept == 2:
         _pair_determinant(m, det)
         for k in range(len(r)):
             _solve_pair(m, det, r[k])
-    else:
+    elif edges is not None:
         _solve_many(kept, m, det, r)
-    if gone:
+    if edges is not None:
         for k in range(len(r)):
             _complete(kept, gone, edges, entry, m, r[k])
 
 
-@compiled
+@helper
 def fill(
     matrix: Matrix,
     table: Floats,
@@ -279,10 +284,10 @@ def fill(
         even: out, Z̃ at the even nodes, (p, 2N + 2, k LANES).
         enclosed: set to False for members whose phase turns, (LANES,).
     """
-    kept, gone = matrix.blocks[:, 0], matrix.blocks[:, 1]
-    starts, edges = len(sources), matrix.entries.edges
-    m = np.empty((kept * kept + gone * (2 * kept + 1)).max() * 2 * LANES)
-    r = np.empty((starts, (kept + gone).max() * 2 * LANES))
+    starts, most, rows = len(sources), 0, 0
+    for kept, gone, _, _ in matrix.blocks:
+        most, rows = max(most, kept * kept + gone * (2 * kept + 1)), max(rows, kept + gone)
+    m, r = np.empty(most * 2 * LANES), np.empty((starts, rows * 2 * LANES))
     det, last, turns = np.empty(2 * LANES), np.empty(2 * LANES), np.empty(2 * LANES)
     for block in range(len(matrix.blocks)):
         size, extra, first, entry = matrix.blocks[block]
@@ -293,7 +298,7 @@ def fill(
             _add_up(table, node, matrix.entries, entry, count, coefficients, m)
             for k in range(wanted):
                 _add_up(table, node, matrix.sources, first, size + extra, sources[k], r[k])
-            _solve(size, extra, edges, entry, m, det, r[:wanted])
+            _solve(size, extra, matrix.edges, entry, m, det, r[:wanted])
             _follow(det, last, turns)
             for k in range(wanted):
                 _write(r[k], matrix.coordinates[first : first + size + extra], odd if node % 2 else even, node // 2, k)
@@ -301,7 +306,7 @@ def fill(
             enclosed[n] &= turns[n] == 0.0 and turns[LANES + n] == 0.0
 
 
-@compiled
+@inlined
 def _write(solution: Floats, coordinates: Array, out: Floats, node: int, start: int) -> None:
     """Write the solution of a start at one node to rows of Z̃, (p, 2N, k LANES)."""
     to, imaginary = WIDTH * np.uint64(start), out.shape[1] // 2 + node

@@ -10,14 +10,12 @@ from __future__ import annotations
 import numpy as np
 
 from fracctl.arrays import Array, Floats
-from fracctl.compiling import compiled_with
+from fracctl.compiling import helper
 
 LANES = 64
 """Members of a block."""
 WIDTH = np.uint64(LANES)
 """The same for compiled loops: places computed without signs need no test for negative ones, which bars vectors."""
-
-compiled = compiled_with(error_model="numpy", fastmath={"reassoc", "contract", "nsz", "arcp"})
 
 
 def lanes(values: Floats, members: Array) -> Floats:
@@ -26,7 +24,7 @@ def lanes(values: Floats, members: Array) -> Floats:
     return np.ascontiguousarray(np.moveaxis(values[..., members[padded]], -2, 0))
 
 
-@compiled
+@helper
 def larger(a: float, b: float) -> float:
     """Return the larger of two numbers; NaN if one is."""
     return a if b <= a or a != a else b

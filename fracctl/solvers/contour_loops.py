@@ -77,6 +77,7 @@ def loops(system: LinearFractionalSystem, y0: Floats, y0_rate: Floats, with_rate
     matrix = CharacteristicMatrix(system)
     parts = [matrix.split(block) for block in matrix.blocks()]
     coordinates = [i for kept, gone in parts for i in kept + gone]
+    simple = all(len(kept) < 3 and not gone for kept, gone in parts)
     exponents: list[Floats] = []
     places = [place for kept, gone in parts for place in _entries(kept, gone)]
     entries, coefficients = _sums([_entry(matrix, i, j) for i, j in places], exponents, (b,))
@@ -94,7 +95,7 @@ def loops(system: LinearFractionalSystem, y0: Floats, y0_rate: Floats, with_rate
 
     stored = [place(i, 0.0) for i in range(p)] + ([place(i, 1.0) for i in range(m)] if with_rates else [])
     return Loops(
-        Matrix(_blocks(parts), np.array(coordinates), entries, sources),
+        Matrix(_blocks(parts), np.array(coordinates), entries, sources, None if simple else entries.edges),
         exponents,
         coefficients,
         np.moveaxis(source_coefficients, 0, 1),

@@ -8,10 +8,11 @@ from __future__ import annotations
 import numpy as np
 
 from fracctl.arrays import Array, Floats
-from fracctl.solvers.contour_lanes import LANES, WIDTH, compiled, larger
+from fracctl.compiling import helper, inlined
+from fracctl.solvers.contour_lanes import LANES, WIDTH, larger
 
 
-@compiled
+@helper
 def enlarge(largest: Floats, rows: Floats) -> None:
     """Take the magnitudes of all rows, four at a time, into the largest (k LANES,)."""
     last = len(rows) - 1
@@ -22,7 +23,7 @@ def enlarge(largest: Floats, rows: Floats) -> None:
             largest[n] = larger(largest[n], larger(a, b))
 
 
-@compiled
+@inlined
 def enlarge_by_gaps(largest: Floats, which: int, values: Floats, checked: Array, others: Floats, first: int) -> None:
     """Take the differences between the checked rows of values[which] and others[first:] into largest[which]."""
     for i in range(len(checked)):
@@ -31,7 +32,7 @@ def enlarge_by_gaps(largest: Floats, which: int, values: Floats, checked: Array,
             largest[which, n] = larger(largest[which, n], abs(values[which, r, n] - others[first + i, n]))
 
 
-@compiled
+@helper
 def combine(values: Floats, used: Array, gains: Floats, control: int, out: Floats) -> None:
     """Σ_u gains[control, u] values[used[u]], two terms at a time.
 
@@ -58,12 +59,15 @@ def combine(values: Floats, used: Array, gains: Floats, control: int, out: Float
                         out[r, at + n] += x + y
 
 
-@compiled
+@helper
 def add_shapes(rows: Floats, shapes: Floats, factors: Floats) -> None:
     """Add factors (k, LANES) times functions of time (r,), or (r, LANES) if members have their own, to rows."""
     for k in range(len(factors)):
         factor = factors[k]
-        if np.any(factor):
+        size = 0.0
+        for n in range(LANES):
+            size += abs(factor[n])
+        if size != 0.0:
             for r in range(len(rows)):
                 target = rows[r, k * LANES : (k + 1) * LANES]
                 if shapes.ndim == 1:
@@ -76,7 +80,7 @@ def add_shapes(rows: Floats, shapes: Floats, factors: Floats) -> None:
                         target[n] += own[n] * factor[n]
 
 
-@compiled
+@helper
 def product(matrix: Floats, rows: Floats, out: Floats) -> None:
     """Product of a matrix (r, e), or of one a member (r, e, LANES), with rows (e, k LANES)."""
     if matrix.ndim == 2:
@@ -89,7 +93,7 @@ def product(matrix: Floats, rows: Floats, out: Floats) -> None:
                     out[r, n] += matrix[r, e, n % LANES] * rows[e, n]
 
 
-@compiled
+@helper
 def times_powers(rows: Floats, table: Floats, first: int, column: int, out: Floats) -> None:
     """Multiply transforms at every other node, real parts first, by powers of the members' own, (P, C, 2, LANES)."""
     count = len(rows) // 2
@@ -101,7 +105,7 @@ def times_powers(rows: Floats, table: Floats, first: int, column: int, out: Floa
                 out[i, n], out[count + i, n] = x * re - y * im, x * im + y * re
 
 
-@compiled
+@helper
 def transpose(rows: Floats, count: int, first: int, member: int, live: int, out: Floats, column: int) -> None:
     """Write `count` rows as those of `live` members from `member` on, out[:, member:, column, first:]."""
     source, target = rows.reshape(-1), out.reshape(-1)
