@@ -6,7 +6,7 @@ import numpy as np
 
 from fracctl.arrays import Array, Floats
 from fracctl.characteristic.matrix import CharacteristicMatrix, Entry
-from fracctl.compiling import compiled
+from fracctl.compiling import compiled, inlined
 
 SMALLEST_RADIUS = 1e-2
 """Least bound that is returned, also for loops whose poles all lie at the origin."""
@@ -23,11 +23,10 @@ def pole_radius(matrix: CharacteristicMatrix) -> Floats:
     the same with column sums where that is smaller; both to 2 %, from above.
     """
     c, e, place = matrix.powers_of(list(range(matrix.size)))
-    lags, sums = np.full((1, len(place)), _NO_LAG), np.empty((2, matrix.size))
-    largest, slowest, top = np.abs(c).max(axis=0)[None], e.max(axis=0), 1.0
-    while min(_norms(largest, lags, 0, top, (top**slowest)[None], 0, place, sums)) > 1.0:
+    lags, largest, slowest, top = np.full((1, len(place)), _NO_LAG), np.abs(c).max(axis=0), e.max(axis=0), 1.0
+    while min(np.bincount(axis, largest * top**slowest).max() for axis in place.T) > 2.0:
         top *= 2.0
-    radii: Floats = _radii(c, e, lags, place, sums, _ladder(top, _RATIO), True)
+    radii: Floats = _radii(c, e, lags, place, matrix.size, _ladder(top, _RATIO), True)
     return radii
 
 
@@ -50,12 +49,13 @@ def pole_height(matrix: CharacteristicMatrix, radius: Floats) -> Floats:
     c, e, lags = (_columns(list(values)) for values in list(zip(*terms, strict=True))[2:])
     c = np.ascontiguousarray(np.broadcast_to(c, (matrix.batch, len(place))))
     ladder = _ladder(1.01 * float(radius.max()), _FINE)
-    return np.minimum(radius, _radii(c, e, lags, place, np.empty((2, len(kept))), ladder, False))
+    return np.minimum(radius, _radii(c, e, lags, place, len(kept), ladder, False))
 
 
 def _ladder(top: float, ratio: float) -> Floats:
+    """Return logarithms of radii."""
     count = 2 + int(np.log(top / SMALLEST_RADIUS) / np.log(ratio))
-    return np.asarray(SMALLEST_RADIUS * np.power(ratio, np.arange(count)))
+    return np.asarray(np.log(SMALLEST_RADIUS) + np.log(ratio) * np.arange(count))
 
 
 _Term = tuple[int, int, Floats, Floats, Floats]
@@ -93,60 +93,68 @@ def _columns(values: list[Floats]) -> Floats:
 
 @compiled
 def _radii(
-    coefficients: Floats, exponents: Floats, lags: Floats, place: Array, sums: Floats, ladder: Floats, convex: bool
+    coefficients: Floats, exponents: Floats, lags: Floats, place: Array, size: int, ladder: Floats, convex: bool
 ) -> Floats:
-    """Find where the norm of each member falls to 1.
+    """Find where the norm of each member falls to 1; the ladder holds logarithms of radii.
 
     The logarithms of sums of powers are convex in log r, so that the chord between two radii of the ladder falls to 0
     beyond them. The search begins where that of the member before has ended.
     """
-    found, logarithms = np.empty(len(coefficients)), np.log(ladder)
-    table, owner = np.empty((len(ladder), len(place))), np.full(len(ladder), -1)
-    k = 0
+    found, norms = np.empty(len(coefficients)), np.empty((len(ladder), 2))
+    sums, table = np.empty((2, size)), np.empty((len(ladder), len(place)))
+    owner, seen = np.zeros(len(ladder), np.int64), np.zeros(len(ladder), np.int64)
+    k, step = 0, 1
     for i in range(len(coefficients)):
-        own = min(i, len(exponents) - 1)
-        _tabulate(exponents, own, logarithms, k, table, owner)
-        below, above = _norms(coefficients, lags, i, ladder[k], table, k, place, sums), (0.0, 0.0)
-        while min(below) > 1.0 and k + 1 < len(ladder):
-            k, above = k + 1, below
-            _tabulate(exponents, own, logarithms, k, table, owner)
-            below = _norms(coefficients, lags, i, ladder[k], table, k, place, sums)
-        while k > 0 and min(above) <= 1.0:
-            _tabulate(exponents, own, logarithms, k - 1, table, owner)
-            above = _norms(coefficients, lags, i, ladder[k - 1], table, k - 1, place, sums)
-            if min(above) <= 1.0:
-                k, below = k - 1, above
-        found[i] = ladder[k]
+        step = 1
+        while step != 0:
+            for at in range(max(k - 1, 0), k + 1):
+                if seen[at] != i + 1:
+                    seen[at] = i + 1
+                    _take_norms(coefficients, i, exponents, lags, place, ladder, at, table, owner, sums, norms)
+            step = 0
+            if min(norms[k, 0], norms[k, 1]) > 1.0:
+                step = 1 if k + 1 < len(ladder) else 0
+            elif k > 0 and min(norms[k - 1, 0], norms[k - 1, 1]) <= 1.0:
+                step = -1
+            k += step
+        found[i] = np.exp(ladder[k])
         if k > 0 and convex:
-            axis = 0 if below[0] <= below[1] else 1
-            low, high = np.log(below[axis]), np.log(above[axis])
-            found[i] *= np.exp(1e-9 + low / (high - low) * (logarithms[k] - logarithms[k - 1]))
+            axis = 0 if norms[k, 0] <= norms[k, 1] else 1
+            low, high = np.log(norms[k, axis]), np.log(norms[k - 1, axis])
+            found[i] *= np.exp(1e-9 + low / (high - low) * (ladder[k] - ladder[k - 1]))
     return found
 
 
-@compiled
-def _tabulate(exponents: Floats, own: int, logarithms: Floats, k: int, table: Floats, owner: Array) -> None:
-    """Make row k of the table hold the powers of radius k with the exponents of member `own`."""
-    if owner[k] != own:
-        owner[k] = own
-        for t in range(exponents.shape[1]):
-            table[k, t] = np.exp(exponents[own, t] * logarithms[k])
-
-
-@compiled
-def _norms(
-    c: Floats, lags: Floats, i: int, radius: float, table: Floats, k: int, place: Array, sums: Floats
-) -> tuple[float, float]:
-    """Return the largest row sum and the largest column sum of N of member i, with the powers of row k of the table."""
-    sums[:] = -1.0
-    own = min(i, len(lags) - 1)
+@inlined
+def _take_norms(
+    c: Floats,
+    i: int,
+    exponents: Floats,
+    lags: Floats,
+    place: Array,
+    ladder: Floats,
+    k: int,
+    table: Floats,
+    owner: Array,
+    sums: Floats,
+    norms: Floats,
+) -> None:
+    """Write the largest row sum and the largest column sum of N of member i at radius k; tabulate powers for it."""
+    own, radius = min(i, len(exponents) - 1), np.exp(ladder[k])
+    if owner[k] != own + 1:
+        owner[k] = own + 1
+        for t in range(len(place)):
+            table[k, t] = np.exp(exponents[own, t] * ladder[k])
+    for axis in range(2):
+        for j in range(sums.shape[1]):
+            sums[axis, j] = -1.0
     for t in range(len(place)):
-        value, lag = abs(c[i, t]) * table[k, t], lags[own, t]
+        value, lag = abs(c[i, t]) * table[k, t], lags[min(i, len(lags) - 1), t]
         if lag >= 0.0:
             value /= lag * radius if radius < 0.5 * lag else radius * radius + 0.25 * lag * lag
         sums[0, place[t, 0]] += value
         sums[1, place[t, 1]] += value
-    row, column = 0.0, 0.0
-    for j in range(sums.shape[1]):
-        row, column = max(row, sums[0, j]), max(column, sums[1, j])
-    return row, column
+    for axis in range(2):
+        norms[k, axis] = 0.0
+        for j in range(sums.shape[1]):
+            norms[k, axis] = max(norms[k, axis], sums[axis, j])

@@ -1,64 +1,59 @@
-"""Compiled determinants of small complex matrices, one by one or at many nodes together."""
+"""Compiled determinants of small complex matrices: what is eliminated at many nodes together, and one by one.
+
+At nodes, matrices are given entry by entry, real before imaginary parts, (2 size², nodes).
+"""
 
 from __future__ import annotations
 
 from fracctl.arrays import Complexes, Floats
-from fracctl.compiling import compiled
+from fracctl.compiling import helper
 
 
-@compiled
-def determinants(entries: Floats, count: int, size: int, gone: int, path: Floats) -> None:
-    """Determinants of matrices given entry by entry, (2, size², nodes), with the last coordinates eliminated first."""
-    re, im = entries
-    kept = size - gone
-    _eliminate(re, im, count, size, kept)
-    if kept == 1:
-        for n in range(count):
-            path[2, n], path[3, n] = re[0, n], im[0, n]
-    elif kept == 2:
-        c, d = size, size + 1
-        for n in range(count):
-            path[2, n] = re[0, n] * re[d, n] - im[0, n] * im[d, n] - re[1, n] * re[c, n] + im[1, n] * im[c, n]
-            path[3, n] = re[0, n] * im[d, n] + im[0, n] * re[d, n] - re[1, n] * im[c, n] - im[1, n] * re[c, n]
-    else:
-        for n in range(count):
-            value = determinant((re[:, n] + 1j * im[:, n]).reshape(size, size)[:kept, :kept])
-            path[2, n], path[3, n] = value.real, value.imag
-    for d in range(kept * size + kept, size * size, size + 1):
-        for n in range(count):
-            x, y = path[2, n], path[3, n]
-            path[2, n], path[3, n] = x * re[d, n] - y * im[d, n], x * im[d, n] + y * re[d, n]
+@helper
+def eliminate(entries: Floats, count: int, size: int, gone: int | None) -> None:
+    """Eliminate the last coordinates, which hold no other of them; the first row is multiplied by their diagonal.
+
+    With None there are none, and nothing is compiled.
+    """
+    if gone is not None:
+        kept = size - gone
+        for k in range(kept, size):
+            for j in range(kept):
+                _divide(entries, count, 2 * (k * size + j), 2 * (k * size + k))
+                for i in range(kept):
+                    _subtract(entries, count, 2 * (i * size + j), 2 * (i * size + k), 2 * (k * size + j))
+        for k in range(kept, size):
+            for j in range(kept):
+                _multiply(entries, count, 2 * j, 2 * (k * size + k))
 
 
-@compiled
-def _eliminate(re: Floats, im: Floats, count: int, size: int, kept: int) -> None:
-    """Eliminate the coordinates from `kept` on, which hold no other of them."""
-    for k in range(kept, size):
-        for j in range(kept):
-            _divide(re, im, count, k * size + j, k * size + k)
-            for i in range(kept):
-                _subtract(re, im, count, i * size + j, i * size + k, k * size + j)
-
-
-@compiled
-def _divide(re: Floats, im: Floats, count: int, a: int, b: int) -> None:
+@helper
+def _divide(entries: Floats, count: int, a: int, b: int) -> None:
     """Divide entry a by entry b."""
     for n in range(count):
-        x, y, u, v = re[a, n], im[a, n], re[b, n], im[b, n]
+        x, y, u, v = entries[a, n], entries[a + 1, n], entries[b, n], entries[b + 1, n]
         scale = 1.0 / (u * u + v * v)
-        re[a, n], im[a, n] = (x * u + y * v) * scale, (y * u - x * v) * scale
+        entries[a, n], entries[a + 1, n] = (x * u + y * v) * scale, (y * u - x * v) * scale
 
 
-@compiled
-def _subtract(re: Floats, im: Floats, count: int, to: int, a: int, b: int) -> None:
+@helper
+def _multiply(entries: Floats, count: int, a: int, b: int) -> None:
+    """Multiply entry a by entry b."""
+    for n in range(count):
+        x, y, u, v = entries[a, n], entries[a + 1, n], entries[b, n], entries[b + 1, n]
+        entries[a, n], entries[a + 1, n] = x * u - y * v, x * v + y * u
+
+
+@helper
+def _subtract(entries: Floats, count: int, to: int, a: int, b: int) -> None:
     """Subtract the product of entries a and b."""
     for n in range(count):
-        x, y, u, v = re[a, n], im[a, n], re[b, n], im[b, n]
-        re[to, n] -= x * u - y * v
-        im[to, n] -= x * v + y * u
+        x, y, u, v = entries[a, n], entries[a + 1, n], entries[b, n], entries[b + 1, n]
+        entries[to, n] -= x * u - y * v
+        entries[to + 1, n] -= x * v + y * u
 
 
-@compiled
+@helper
 def determinant(matrix: Complexes) -> complex:
     """Determinant of a matrix, by elimination in place."""
     value, size = 1.0 + 0.0j, len(matrix)

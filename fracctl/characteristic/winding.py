@@ -3,25 +3,25 @@
 det M̃ is followed along a path that closes in the upper right quarter: from a real point beyond all zeros along an
 arc to the line Re σ = a, down the line, and by a small arc around the branch point back to the real axis. By the
 symmetry of det M̃ about the real axis, the number of zeros to the right is the change of phase over π.
+
+No path is needed for one coordinate where Im M(i r) = Σ c r^β sin(β π/2) has one sign for all r.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from fracctl.arrays import Booleans, Floats
+from fracctl.arrays import Array, Booleans, Floats
 from fracctl.characteristic.bounds import pole_radius
+from fracctl.characteristic.doubts import zeros_with_doubts
+from fracctl.characteristic.equation import Equation, equations
 from fracctl.characteristic.matrix import CharacteristicMatrix, Powers
-from fracctl.characteristic.phase import zeros_to_the_right
+from fracctl.characteristic.phase import COUNTED, DOUBTFUL, SHORT, zeros_to_the_right
 
-_INNER, _INNERMOST = np.log(1e-5), np.log(1e-250)
-"""Logarithm of the radius at which a path ends at first, and of the least value of its power σ^Σℓ in det M̃."""
+_INNER, _INNERMOST = np.log(1e-5), -1e5
+"""Logarithms of the radii at which a path ends, at first and at most."""
 _STEP = np.log(1.2)
-"""Of the path along the axis, in the logarithm of the radius."""
-_VANISHING = 1e-13
-"""Size of det M(0), relative to what it is computed from, below which there is a zero at the origin."""
-_ARC = np.linspace(1.0, 0.0, 8)[1:]
-"""Angles of the nodes around the branch point, in right angles."""
+"""Of the path along the axis, in the logarithm of the radius; beyond the inner end it grows with that."""
 
 
 def unstable_zeros(matrix: CharacteristicMatrix, radius: Floats | None = None) -> tuple[Floats, Booleans]:
@@ -37,37 +37,66 @@ def unstable_zeros(matrix: CharacteristicMatrix, radius: Floats | None = None) -
     """
     radius = pole_radius(matrix) if radius is None else radius
     zeros, resolved = np.zeros(matrix.batch), np.ones(matrix.batch, dtype=bool)
-    row_sums = _static_row_sums(matrix)
     for block in matrix.blocks():
-        kept, gone = matrix.split(block)
-        powers, vanishing = matrix.powers_of(kept + gone), _VANISHING * row_sums[:, block].prod(axis=1)
-        outer = float(np.log(radius.max() * _near_identity(powers, len(block))))
-        found, clear = _counted(powers, matrix.highest[kept + gone], len(gone), vanishing, outer, _INNER)
-        zeros += found
-        resolved &= clear
+        outer = float(np.log(radius.max() * _near_identity(matrix.powers_of(block), len(block))))
+        for rows, equation in equations(matrix, block):
+            found, clear = _by_sign(equation, matrix.highest[block])
+            undecided = np.flatnonzero(~clear & (np.abs(equation.limit) > equation.vanishing))
+            if len(undecided):
+                part = equation if len(undecided) == len(rows) else equation.take(undecided)
+                found[undecided], clear[undecided] = _followed(part, outer)
+            zeros[rows] += found
+            resolved[rows] &= clear
     return np.where(resolved, zeros, np.nan), ~resolved
 
 
-def _static_row_sums(matrix: CharacteristicMatrix) -> Floats:
-    """Return row sums of |A_j| over all terms of order 0, (b, p): det M(0) is known to rounding of their products."""
-    sums = np.zeros((matrix.batch, matrix.size))
-    for term in matrix.system.dynamics:
-        static = term.orders == 0.0
-        if static.any():
-            sums += (np.abs(term.matrix) * static[..., None, :]).sum(axis=-1)
-    return sums
+def _by_sign(equation: Equation, highest: Floats) -> tuple[Floats, Booleans]:
+    """Count the zeros of one coordinate where Im M has one sign on the upper imaginary axis, and say where it has.
+
+    From a phase of ℓ π/2 at infinity, M then goes to the origin through the upper half plane alone, or the lower. Where
+    M is real, it is σ² + M(0).
+    """
+    if len(highest) > 1:
+        return np.zeros(len(equation.limit)), np.zeros(len(equation.limit), dtype=bool)
+    divided = (equation.degree - highest)[:, None]
+    lift = equation.coefficients * _sine(np.round(equation.orders - divided, 12))
+    up, down = (lift > 0.0).any(axis=1), (lift < 0.0).any(axis=1)
+    negative = equation.limit < 0.0
+    zeros = np.where(negative, 1.0, np.where(down, 2.0, 0.0))
+    return zeros, (np.abs(equation.limit) > equation.vanishing) & ((up != down) | (negative & ~up & ~down))
 
 
-def _counted(
-    powers: Powers, highest: Floats, gone: int, vanishing: Floats, outer: float, inner: float
-) -> tuple[Floats, Booleans]:
-    """Count along a path between two logarithms of radii, and along a longer one where it ends too early."""
-    line = outer - _STEP * np.arange(-1.0, 2.0 + (outer - inner) / _STEP)
-    zeros, resolved, short = zeros_to_the_right(*powers, highest, gone, vanishing, line, _ARC)
-    if short.any() and 2.0 * inner * highest.sum() > _INNERMOST:
-        rest = powers.take(short)
-        zeros[short], resolved[short] = _counted(rest, highest, gone, vanishing[short], outer, 2.0 * inner)
+def _sine(order: Floats) -> Floats:
+    """Return sin(order π/2), exact for whole orders."""
+    whole = np.rint(order)
+    exact = np.array([0.0, 1.0, 0.0, -1.0])[whole.astype(int) % 4]
+    sine: Floats = np.where(order == whole, exact, np.sin(0.5 * np.pi * order))
+    return sine
+
+
+def _followed(equation: Equation, outer: float) -> tuple[Floats, Booleans]:
+    """Count along a path, and along a longer one where it ends too early."""
+    line = outer - _STEP * np.arange(-1.0, 2.0 + (outer - _INNER) / _STEP)
+    zeros, resolved, short = _counted(equation, line)
+    if len(short):
+        growth = 1.0 - _STEP / line[-1]
+        further = line[-1] * growth ** np.arange(1.0, 1.0 + np.log(_INNERMOST / line[-1]) / np.log(growth))
+        zeros[short], resolved[short], _ = _counted(equation.take(short), np.append(line, further))
     return zeros, resolved
+
+
+def _counted(equation: Equation, line: Floats) -> tuple[Floats, Booleans, Array]:
+    """Count along a path, in shorter steps where they are doubtful; say what is resolved, and what ends too early."""
+    c, orders, place, degree, limit, sums, _, gone = equation
+    rho = float(line[0] - np.log(2.0 * degree.max()))
+    zeros, outcome, lasts = zeros_to_the_right(c, orders, place, degree, limit, sums, line, rho, gone)
+    resolved, doubtful = outcome == COUNTED, np.flatnonzero(outcome == DOUBTFUL)
+    if len(doubtful):
+        c, orders, place, degree, _, sums, _, _ = equation.take(doubtful)
+        zeros[doubtful], resolved[doubtful] = zeros_with_doubts(
+            c, orders, place, degree, sums, line, rho, lasts[doubtful]
+        )
+    return zeros, resolved, np.flatnonzero(outcome == SHORT)
 
 
 def _near_identity(powers: Powers, size: int) -> float:

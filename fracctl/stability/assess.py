@@ -47,5 +47,5 @@ def assess(loop: ClosedLoop) -> Verdict:
         return Verdict(None, poles, f"det M vanishes on the imaginary axis; {found}")
     count = int(zeros[0])
     if count == 0 and len(poles) and poles[0].real > ON_THE_AXIS * abs(poles[0]):
-        return Verdict(False, poles, f"a pole at {poles[0]:.3g}, nearer to the origin than zeros are counted; {found}")
+        return Verdict(False, poles, f"a pole at {poles[0]:.3g}, though none is counted; {found}")
     return Verdict(count == 0, poles, f"{count} zeros of det M with Re σ > 0; {found}")

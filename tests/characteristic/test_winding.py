@@ -11,11 +11,11 @@ from scipy.optimize import brentq
 
 from fracctl.characteristic import CharacteristicMatrix, abscissa_bound, principal_poles, unstable_zeros
 from fracctl.characteristic.bounds import pole_radius
-from fracctl.controllers import LinearLawTerms, PDAlpha
+from fracctl.controllers import LinearLawTerms, PDAlpha, PILambdaDMu
 from fracctl.errors import ArgumentError
 from fracctl.fractional.terms import FractionalTerm
 from fracctl.loop import ClosedLoop
-from fracctl.plants import HCWInPlane, LinearPlant
+from fracctl.plants import HCWInPlane, HCWOutOfPlane, LinearPlant
 from tests.references import loops, poles
 from tests.references.loops import Loop
 from tests.references.product import closed_loop
@@ -185,3 +185,73 @@ def test_determinant_is_that_of_the_written_out_matrix(members: list[Loop]) -> N
 def test_principal_poles_refuse_a_batch(members: list[Loop]) -> None:
     with pytest.raises(ArgumentError, match="must belong to a single loop"):
         principal_poles(CharacteristicMatrix(closed_loop(members[:2]).system))
+
+
+def count_at_half_orders(
+    stiffness: np.ndarray, damping: np.ndarray, k_p: np.ndarray, k_i: np.ndarray, k_d: np.ndarray
+) -> int:
+    """Count the zeros with λ = μ = 1/2: with s = √σ, s M is s⁵ - damping s³ + K_D s² + (K_P - stiffness) s + K_I."""
+    size = len(k_p)
+    blocks = [k_i, k_p - stiffness, k_d, -damping, np.zeros((size, size))]
+    companion = np.vstack([np.eye(4 * size, 5 * size, size), -np.hstack(blocks)])
+    roots = np.linalg.eigvals(companion)
+    return int(((np.abs(np.angle(roots)) < np.pi / 4.0) & (np.abs(roots) > 1e-12)).sum())
+
+
+@pytest.mark.parametrize("order", [0.02, 0.3, 0.5, 1.0])
+@pytest.mark.parametrize("k_d", [0.0, 1e-3, 2.0])
+def test_a_negative_integral_gain_has_one_real_pole_however_small(order: float, k_d: float) -> None:
+    """σ² + k_D σ^μ + 1.5 + k_I σ^(-λ) with k_I < 0 ≤ k_D: by Descartes' rule one positive zero, near (-k_I/1.5)^(1/λ);
+    no others, as Im > 0 on the upper axis."""
+    k_i = -(10.0 ** np.linspace(-12.0, 0.0, 25))
+    law = PILambdaDMu(np.full(25, 0.5), k_i, np.full(25, k_d), order, 0.9)
+    zeros, marginal = unstable_zeros(CharacteristicMatrix(ClosedLoop(HCWOutOfPlane(), law).system))
+    assert not marginal.any()
+    np.testing.assert_array_equal(zeros, 1.0)
+
+
+@pytest.mark.parametrize("size", [1, 2, 3])
+def test_counts_with_integrals_are_those_of_roots_at_half_orders(size: int) -> None:
+    """Gains over ten decades, some without an integral, so that the poles nearest to the origin are below any path."""
+    generator = np.random.default_rng(20 + size)
+    k_p, k_i, k_d = generator.uniform(-3.0, 3.0, (3, 120, size, size))
+    k_p, k_d = k_p + 4.0 * np.eye(size), k_d + 3.0 * np.eye(size)
+    k_i *= 10.0 ** generator.uniform(-7.0, 0.0, (120, 1, 1))
+    k_i[::7] = 0.0
+    damping = np.triu(np.ones((size, size)), 1) - np.tril(np.ones((size, size)), -1)
+    stiffness = np.zeros((size, size))
+    law = PILambdaDMu(*(gain if size > 1 else gain[:, 0, 0] for gain in (k_p, k_i, k_d)), 0.5, 0.5)
+    zeros, marginal = unstable_zeros(CharacteristicMatrix(ClosedLoop(LinearPlant(stiffness, damping), law).system))
+    expected = [count_at_half_orders(stiffness, damping, *gains) for gains in zip(k_p, k_i, k_d, strict=True)]
+    assert not marginal.any()
+    np.testing.assert_array_equal(zeros, expected)
+    assert len(set(expected)) > 2
+
+
+def test_integrals_of_orders_of_their_own_count_as_alone() -> None:
+    generator = np.random.default_rng(8)
+    k_p, k_i, k_d = generator.uniform(-1.0, 1.0, (3, 40, 2, 2)) * np.array([2.0, 1e-3, 1.0])[:, None, None, None]
+    k_p, k_d, k_i[::5] = k_p + 5.0 * np.eye(2), k_d + 3.0 * np.eye(2), 0.0
+    integral, derivative = generator.uniform(0.2, 1.0, (2, 40, 2))
+    law = PILambdaDMu(k_p, k_i, k_d, integral, derivative)
+    zeros, marginal = unstable_zeros(CharacteristicMatrix(ClosedLoop(HCWInPlane(), law).system))
+    assert not marginal.any()
+    for i in range(40):
+        alone = PILambdaDMu(k_p[i], k_i[i], k_d[i], integral[i], derivative[i])
+        assert unstable_zeros(CharacteristicMatrix(ClosedLoop(HCWInPlane(), alone).system))[0] == zeros[i]
+    assert len(set(zeros)) > 1
+
+
+@pytest.mark.parametrize("scale", [1e-9, 1.0])
+def test_integrals_of_one_combination_count_as_one(scale: float) -> None:
+    """K_I of rank one: the lowest power of the determinant vanishes but for rounding."""
+    generator = np.random.default_rng(9)
+    left, right = generator.normal(size=(2, 50, 2))
+    k_i = scale * left[:, :, None] * right[:, None, :]
+    k_p, k_d = 5.0 * np.eye(2) + generator.normal(size=(50, 2, 2)), np.broadcast_to(3.0 * np.eye(2), (50, 2, 2))
+    law = PILambdaDMu(k_p, k_i, k_d, 0.5, 0.5)
+    nothing = np.zeros((2, 2))
+    zeros, marginal = unstable_zeros(CharacteristicMatrix(ClosedLoop(LinearPlant(nothing), law).system))
+    expected = [count_at_half_orders(nothing, nothing, *gains) for gains in zip(k_p, k_i, k_d, strict=True)]
+    assert not marginal.any()
+    np.testing.assert_array_equal(zeros, expected)
