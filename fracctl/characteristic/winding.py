@@ -40,8 +40,8 @@ def unstable_zeros(matrix: CharacteristicMatrix, radius: Floats | None = None) -
     for block in matrix.blocks():
         outer = float(np.log(radius.max() * _near_identity(matrix.powers_of(block), len(block))))
         for rows, equation in equations(matrix, block):
-            found, clear = _by_sign(equation, matrix.highest[block])
-            undecided = np.flatnonzero(~clear & (np.abs(equation.limit) > equation.vanishing))
+            found, clear, decided = _by_sign(equation, matrix.highest[block])
+            undecided = np.flatnonzero(~decided & (np.abs(equation.limit) > equation.vanishing))
             if len(undecided):
                 part = equation if len(undecided) == len(rows) else equation.take(undecided)
                 found[undecided], clear[undecided] = _followed(part, outer)
@@ -50,20 +50,24 @@ def unstable_zeros(matrix: CharacteristicMatrix, radius: Floats | None = None) -
     return np.where(resolved, zeros, np.nan), ~resolved
 
 
-def _by_sign(equation: Equation, highest: Floats) -> tuple[Floats, Booleans]:
-    """Count the zeros of one coordinate where Im M has one sign on the upper imaginary axis, and say where it has.
+def _by_sign(equation: Equation, highest: Floats) -> tuple[Floats, Booleans, Booleans]:
+    """Count the zeros of one coordinate where Im M has one sign on the upper imaginary axis, or is 0.
 
     From a phase of ℓ π/2 at infinity, M then goes to the origin through the upper half plane alone, or the lower. Where
-    M is real, it is σ² + M(0).
+    M is real, it is σ² + M(0), with two zeros on the axis or one on the right.
+
+    Returns:
+        The counts, whether no zero lies on the axis, and whether these are known, (b,) each.
     """
     if len(highest) > 1:
-        return np.zeros(len(equation.limit)), np.zeros(len(equation.limit), dtype=bool)
+        none = np.zeros(len(equation.limit), dtype=bool)
+        return np.zeros(len(none)), none, none.copy()
     divided = (equation.degree - highest)[:, None]
     lift = equation.coefficients * _sine(np.round(equation.orders - divided, 12))
     up, down = (lift > 0.0).any(axis=1), (lift < 0.0).any(axis=1)
-    negative = equation.limit < 0.0
+    negative, known = equation.limit < 0.0, np.abs(equation.limit) > equation.vanishing
     zeros = np.where(negative, 1.0, np.where(down, 2.0, 0.0))
-    return zeros, (np.abs(equation.limit) > equation.vanishing) & ((up != down) | (negative & ~up & ~down))
+    return zeros, known & ((up != down) | (negative & ~up & ~down)), known & ~(up & down)
 
 
 def _sine(order: Floats) -> Floats:
