@@ -11,6 +11,10 @@ import numba
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
+_ALIKE: dict[str, Any] = {"forceinline": True}
+"""Every kernel holds its own copy of what it calls: which of several compiled copies is linked would depend on whether
+a process compiles or loads them, and copies whose arithmetic was reordered differently do not give the same bits."""
+
 
 def forget_outdated(package: Path) -> None:
     """Remove the machine code beside the modules of a package if any module with kernels or helpers is newer.
@@ -38,6 +42,7 @@ def compiled_with(**options: Any) -> Callable[[_Function], _Function]:
     The machine code is kept on disk: in NUMBA_CACHE_DIR if it is set, else beside the module or in the user's cache.
     Where none of them can be written to, every process compiles anew.
     """
+    options |= _ALIKE
 
     def decorate(function: _Function) -> _Function:
         kernel: _Function
@@ -56,7 +61,7 @@ def helper_with(**options: Any) -> Callable[[_Function], _Function]:
     They are compiled and kept as parts of those: entries for Python would take a third more time to compile. To call
     one from Python is a crash.
     """
-    options |= {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+    options |= _ALIKE | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
     def decorate(function: _Function) -> _Function:
         kernel: _Function = numba.njit(**options)(function)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -49,6 +50,20 @@ def test_tables_are_bitwise_equal_for_any_scheduler(tmp_path: Path) -> None:
         tables.append(tables_of(execute(compose(words, None)).run_directory))
     assert tables[0] == tables[1]
     assert tables[0] == tables[2]
+
+
+@pytest.mark.slow
+def test_tables_are_bitwise_equal_whether_kernels_are_compiled_or_loaded(tmp_path: Path) -> None:
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "kernels")}
+    axes = ["survey.axes.alpha_w=0.95", "survey.axes.k_p_w=0:2:0.25", "survey.axes.k_d_w=0:2:0.25"]
+    tables = []
+    for name in ("compiled", "loaded"):
+        words = ["experiment=outofplane", "figures=[]", f"output_dir={tmp_path / name}", *axes, "scheduler=serial"]
+        command = [sys.executable, "-m", "fracctl", "run", "--quiet", *words]
+        done = subprocess.run(command, env=environment, cwd=tmp_path, capture_output=True, text=True, check=True)
+        tables.append(tables_of(Path(done.stdout.splitlines()[-1])))
+    assert len(tables[0]["evaluations"]["status"]) == 3 * 81
+    assert tables[0] == tables[1]
 
 
 def test_overrides_may_choose_the_scheduler(tmp_path: Path) -> None:
