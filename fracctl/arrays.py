@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -90,3 +91,8 @@ def batch_size(**arrays: tuple[Array, int]) -> int | None:
             (second, b) = next((n, s) for n, s in sizes.items() if s not in (1, a))
         raise ArgumentError(second, f"a batch of {b}", f"must have the same batch size as `{first}`, {a}")
     return max(sizes.values()) if sizes else None
+
+
+def joined(parts: Sequence[Mapping[str, Array]]) -> dict[str, Array]:
+    """Return parts of a table, arrays by column, one after the other with the columns of the first."""
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}

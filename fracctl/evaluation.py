@@ -101,10 +101,6 @@ class Evaluation:
         """What every survey of this evaluation varies besides design variables; values by column."""
         return {}
 
-    def findings(self, rows: Mapping[str, Array]) -> list[str]:  # noqa: ARG002 - the optima say it all
-        """Return sentences on rows of the table, for the summary."""
-        return []
-
     def by_law(self, rows: Mapping[str, Array]) -> Iterator[tuple[Evaluation, Array]]:
         """Yield the evaluations whose designs the rows hold, with the places of their rows."""
         yield self, np.arange(len(rows["initial_condition"]))

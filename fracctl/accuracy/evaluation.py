@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -13,8 +13,8 @@ import numpy as np
 from fracctl.accuracy.findings import findings
 from fracctl.accuracy.references import References
 from fracctl.accuracy.settings import Setting, settings
-from fracctl.arrays import Array, Floats
-from fracctl.evaluation import COUNTERS, Evaluation
+from fracctl.arrays import Array, Floats, joined
+from fracctl.evaluation import COUNTERS, Conclusion, Evaluation
 
 SETTING = "setting"
 """Column that numbers the settings, an axis of the survey."""
@@ -90,9 +90,10 @@ class AccuracyEvaluation(Evaluation):
                 rows.append({"initial_condition": name, **point, SETTING: float(number), **row})
         return {name: _column([row[name] for row in rows]) for name in self.row_columns}
 
-    def findings(self, rows: Mapping[str, Array]) -> list[str]:
+    def conclude(self, parts: Iterable[Mapping[str, Array]]) -> Conclusion:
         """Return what the rows say about the solvers."""
-        return findings(rows, [name for name in self.design_variables if name.startswith("alpha_")])
+        orders = [name for name in self.design_variables if name.startswith("alpha_")]
+        return Conclusion(notes=tuple(findings(joined(list(parts)), orders)))
 
     def _row(
         self, setting: Setting, point: Mapping[str, float], initial_condition: str, references: References

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fracctl.arrays import Array, Floats
+from fracctl.arrays import Array, Floats, joined
 from fracctl.comparison.bounds import BOUND
 from fracctl.comparison.evaluation import LAW, OPEN_LOOP, PART, ComparisonEvaluation
 from fracctl.comparison.findings import findings
@@ -39,9 +39,7 @@ NOTHING = "none"
 
 def conclude(comparison: ComparisonEvaluation, parts: Iterable[Mapping[str, Array]]) -> Conclusion:
     """Return the table: for every initial condition, limit and band a row for each law, and the bound as the last."""
-    pieces = list(parts)
-    rows = {name: np.concatenate([piece[name] for piece in pieces]) for name in pieces[0]}
-    table = _Table(comparison, rows)
+    table = _Table(comparison, joined(list(parts)))
     records = [
         record
         for condition in comparison.initial_conditions

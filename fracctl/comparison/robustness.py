@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fracctl.arrays import Array, Floats
+from fracctl.arrays import Array, Floats, joined
 from fracctl.comparison.descent import descend, neighbours
 from fracctl.comparison.evaluation import PART, ComparisonEvaluation
 from fracctl.comparison.laws import LawEvaluation
@@ -113,7 +113,7 @@ class _Table:
 
     def rows(self) -> dict[str, Array]:
         """Return all of them."""
-        rows = {name: np.concatenate([part[name] for part in self._parts]) for name in self._parts[0]}
+        rows = joined(self._parts)
         return rows | {SEARCHED_FOR: np.full(len(rows[POINT]), None, dtype=object)}
 
 

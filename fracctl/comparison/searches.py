@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fracctl.arrays import Array, Floats
+from fracctl.arrays import Array, Floats, joined
 from fracctl.comparison.descent import descend
 from fracctl.comparison.evaluation import PART, ComparisonEvaluation, sound
 from fracctl.comparison.laws import Law, LawEvaluation
@@ -16,13 +16,10 @@ from fracctl.evaluation import Evaluation
 from fracctl.measures.final_distance import FinalDistance
 from fracctl.surveys.base import EVALUATIONS_SPENT, POINT, SEARCHED_FOR
 from fracctl.surveys.search_algorithms import DIFFERENTIAL_EVOLUTION, Optimiser
-from fracctl.surveys.search_run import SeededSearch, Variable
+from fracctl.surveys.search_run import Variable, latin_hypercube, penalties
 
 START, SEARCHED, GRID, POLISHED = "start", "search", "grid", "polish"
 """Parts of the study that rows of searches belong to; a start counts for nothing but its block."""
-
-_EXCESS, _UNSETTLED, _WORST = 1e9, 1e12, 1e15
-"""Values of points that break a limit, do not settle, or are unstable; no objective is as large."""
 
 
 @dataclass(frozen=True)
@@ -83,11 +80,7 @@ class Evolution:
 
     def _sample(self, comparison: ComparisonEvaluation, law: Law, seed: tuple[int, ...]) -> Floats:
         """Return a first generation; searches of different laws share the values of the variables they share."""
-        box, name = self._box(comparison, law), self.problems[0].objective
-        search = SeededSearch(
-            DIFFERENTIAL_EVOLUTION, self.initial_condition, (name,), box, (seed,), self.population, self.evaluations, {}
-        )
-        return search.first_generation(seed)
+        return latin_hypercube(self._box(comparison, law), self.population, seed)
 
     def _box(self, comparison: ComparisonEvaluation, law: Law) -> tuple[Variable, ...]:
         return comparison.box(law, comparison.largest_gain(self.problems[0]))
@@ -188,11 +181,6 @@ def table_rows(
     return table | {POINT: np.arange(len(points)), SEARCHED_FOR: np.full(len(points), None, dtype=object)}
 
 
-def joined(parts: Sequence[Mapping[str, Array]]) -> dict[str, Array]:
-    """Return parts of a table one after the other."""
-    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-
-
 def edges(box: Sequence[Variable]) -> tuple[Floats, Floats]:
     """Return lower and upper bounds, (n,) each."""
     return np.array([variable.lower for variable in box]), np.array([variable.upper for variable in box])
@@ -207,14 +195,10 @@ def of(evaluation: Evaluation) -> ComparisonEvaluation:
 def _told(comparison: ComparisonEvaluation, rows: Mapping[str, Array], problem: Problem) -> Floats:
     """Return what a search for a problem minimises, finite for every row."""
     values = comparison.admissible(rows, problem)
-    told = np.where(np.isfinite(values), values, _WORST)
-    excess, distance = comparison.excess(rows, problem), np.asarray(rows[FinalDistance.name], dtype=np.float64)
-    settled = sound(rows) & np.isfinite(rows[f"objective_{problem.objective}"])
-    beyond = settled & (excess > 0.0)
-    told[beyond] = _EXCESS * (1.0 + np.minimum(excess[beyond], 100.0))
-    unsettled = sound(rows) & ~settled & np.isfinite(distance)
-    told[unsettled] = _UNSETTLED * (1.0 + np.minimum(distance[unsettled], 100.0))
-    return told
+    settled = np.isfinite(rows[f"objective_{problem.objective}"])
+    excess = np.where(sound(rows) & settled, comparison.excess(rows, problem), 0.0)
+    distance = np.where(sound(rows) & ~settled, rows[FinalDistance.name], np.inf)
+    return np.where(np.isfinite(values), values, penalties(excess, distance))
 
 
 def _watched(evaluation: LawEvaluation, initial_condition: str) -> LawEvaluation:

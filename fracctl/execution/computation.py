@@ -110,7 +110,7 @@ class Computation:
 
     def _compute(self) -> dict[str, Any]:
         store = self._evaluate()
-        tally, optima, check, findings = self._tables(store)
+        tally, optima, check = self._tables(store)
         poles = self._write_optima(optima)
         conclusion = self._conclude(check)
         self._trajectories()
@@ -120,7 +120,7 @@ class Computation:
             notes.append(f"stored parts that could not be trusted and were computed again: {store.damaged}")
         notes += notes_on_tails(self._evaluation, found)
         notes += check.notes()
-        notes += [*findings, *conclusion.notes]
+        notes += conclusion.notes
         notes += draw_figures(self._directory, self._job.configuration["figures"])
         identity = {
             "experiment": str(self._job.configuration["name"]),
@@ -148,7 +148,7 @@ class Computation:
             raise RunError(f"every point failed: {next(iter(store.failures.values()), 'there is none')}")
         return store
 
-    def _tables(self, store: RowStore) -> tuple[Tally, list[dict[str, Any]], CrossCheck, list[str]]:
+    def _tables(self, store: RowStore) -> tuple[Tally, list[dict[str, Any]], CrossCheck]:
         """Join the parts, select the optima, check a share of the rows and the optima by another solver."""
         evaluation = self._evaluation
         table = self._evaluations_schema
@@ -158,15 +158,13 @@ class Computation:
             evaluation.objectives, evaluation.design_variables, self._survey.slices, self._survey.baseline
         )
         check = CrossCheck(evaluation, int(self._job.configuration["seed"]))
-        findings: list[str] = []
         for rows in self._directory.stream_evaluations():
             tally.add(rows)
             selection.add(rows)
             check.add(rows)
-            findings += evaluation.findings(rows)
         optima = selection.rows()
         check.add_optima(optima)
-        return tally, optima, check, findings
+        return tally, optima, check
 
     def _write_optima(self, optima: list[dict[str, Any]]) -> Poles:
         """Complete the optima by their poles, and write both."""

@@ -103,7 +103,7 @@ class CrossCheck:
         for i in np.flatnonzero(~(difference <= allowed)).tolist():
             point = ", ".join(f"{name} = {float(values[i]):g}" for name, values in design.items())
             self.disagreements.append(
-                f"{conditions[int(i)]}, {point}: {self.evaluation.solver.name} and {self._second.name} differ by"
+                f"{conditions[i]}, {point}: {self.evaluation.solver.name} and {self._second.name} differ by"
                 f" {difference[i]:.1e} of the peak"
             )
 

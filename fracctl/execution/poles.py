@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fracctl.arrays import Array, Complexes
+from fracctl.arrays import Array, Complexes, joined
 from fracctl.characteristic import CharacteristicMatrix, principal_poles
 from fracctl.errors import ArgumentError
 from fracctl.evaluation import Evaluation
@@ -54,7 +54,7 @@ class Poles:
     def rows(self) -> dict[str, Array]:
         """Return the columns of ``poles.parquet``: `run` (row of the optima), `variable`, `denominator`, value."""
         parts = [_part(0, SIGMA, 1, np.zeros(0, dtype=np.complex128)), *self._parts]
-        return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+        return joined(parts)
 
     def summary(self) -> dict[str, Any]:
         """Return what the summary of the run says of it; a disagreement fails the run."""

@@ -21,14 +21,10 @@ class PeakAcceleration:
 
     def __call__(self, trajectory: Trajectory) -> dict[str, Floats]:
         """Return column ``peak_acceleration``, (b,)."""
-        blank = trajectory.missing
-        controls = np.where(blank[:, None, None], 0.0, trajectory.controls_at_nodes)
-        either = np.zeros(len(controls))
-        peak = np.abs([trajectory.initial_controls, controls[:, :, 0]]).max(axis=(0, 2))
-        for i in range(controls.shape[1]):
-            within = largest_excursion(trajectory.grid, controls[:, i], either, with_end=True)
-            peak = np.maximum(peak, within)
-        return {self.name: np.where(blank, np.inf, peak)}
+        controls = trajectory.controls_at_nodes
+        within = largest_excursion(trajectory.grid, controls, np.zeros(controls.shape[:2]), with_end=True)
+        begin = np.abs([trajectory.initial_controls, controls[:, :, 0]])
+        return {self.name: np.fmax(begin.max(axis=0), within).max(axis=1)}
 
 
 def peak_acceleration(trajectory: Trajectory) -> Floats | float:

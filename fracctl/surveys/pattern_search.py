@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fracctl.arrays import Array, Floats
+from fracctl.arrays import Array, Floats, joined
 from fracctl.evaluation import Evaluation
 from fracctl.surveys.base import EVALUATIONS_SPENT, POINT, SEARCHED_FOR, Rows
 from fracctl.surveys.optima import Rank, ranks
@@ -117,7 +117,7 @@ class _Known:
 
     def rows(self, places: Array) -> dict[str, Array]:
         """Return the rows at these places."""
-        return {name: np.concatenate([part[name] for part in self._parts])[places] for name in self._parts[0]}
+        return {name: column[places] for name, column in joined(self._parts).items()}
 
     def _evaluate(self, points: Floats) -> None:
         names, objective = self._evaluation.design_variables, self._objective

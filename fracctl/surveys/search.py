@@ -15,7 +15,7 @@ from fracctl.errors import ArgumentError, suggestion
 from fracctl.evaluation import Evaluation
 from fracctl.surveys.base import SEARCH_COLUMNS, Block, Rows
 from fracctl.surveys.search_algorithms import NSGA2
-from fracctl.surveys.search_run import SeededSearch, Variable
+from fracctl.surveys.search_run import SeededSearch, Variable, latin_hypercube
 
 ABREAST = 4
 """Starts in a block: more are faster, fewer leave more blocks for other processes."""
@@ -107,7 +107,7 @@ class PopulationSearch:
 
 def _starts(search: SeededSearch, held: Mapping[str, float]) -> dict[str, Floats]:
     """Return the first point of each search; what is not varied is as in `held`."""
-    points = np.stack([search.first_generation(seed)[0] for seed in search.seeds])
+    points = np.stack([latin_hypercube(search.variables, search.population, seed)[0] for seed in search.seeds])
     varied = {variable.name: np.ascontiguousarray(points[:, i]) for i, variable in enumerate(search.variables)}
     return {name: np.full(len(points), float(value)) for name, value in held.items()} | varied
 

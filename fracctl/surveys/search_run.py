@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from fracctl.arrays import Array, Booleans, Floats
+from fracctl.arrays import Array, Booleans, Floats, joined
 from fracctl.evaluation import Evaluation
 from fracctl.measures import Measure
 from fracctl.measures.final_distance import FinalDistance
@@ -82,22 +82,17 @@ class SeededSearch:
                     optimiser.tell(values[part])
         return self._path(records)
 
-    def first_generation(self, seed: Sequence[int]) -> Floats:
-        """Return a Latin hypercube sample of the box, (p, n); each variable has a random stream of its own.
-
-        So searches of different laws with one seed begin with the same values of the variables that they share.
-        """
-        columns = []
-        for variable in self.variables:
-            random = np.random.default_rng([*seed, *variable.name.encode()])
-            places = (random.permutation(self.population) + random.random(self.population)) / self.population
-            columns.append(variable.lower + places * (variable.upper - variable.lower))
-        return np.stack(columns, axis=1)
-
     def _optimiser(self, seed: Sequence[int]) -> Optimiser:
         lower, upper = np.array([(variable.lower, variable.upper) for variable in self.variables]).T
         number = int(np.random.SeedSequence(seed).generate_state(1)[0])
-        return Optimiser(self.algorithm, self.first_generation(seed), lower, upper, len(self.objectives), number)
+        return Optimiser(
+            self.algorithm,
+            latin_hypercube(self.variables, self.population, seed),
+            lower,
+            upper,
+            len(self.objectives),
+            number,
+        )
 
     def _design(self, points: Floats, starts: Mapping[str, Floats], size: int) -> dict[str, Floats]:
         """Return all design variables of the points (b·size, n): those that are not varied as in their start."""
@@ -113,15 +108,13 @@ class SeededSearch:
             excess[sound] += np.maximum(rows[column][sound] / limit - 1.0, 0.0)
         beyond = excess > 0.0
         rows["status"][beyond] = BEYOND_LIMITS
-        unsettled = ~sound & np.isfinite(rows[FinalDistance.name]) & (rows["status"] == "unsettled")
-        values[~sound] = _WORST
-        values[beyond] = _EXCESS * (1.0 + np.minimum(excess[beyond, None], 100.0))
-        values[unsettled] = _UNSETTLED * (1.0 + np.minimum(rows[FinalDistance.name][unsettled, None], 100.0))
-        return values, sound & ~beyond
+        distance = np.where(~sound & (rows["status"] == "unsettled"), rows[FinalDistance.name], np.inf)
+        admissible = sound & ~beyond
+        return np.where(admissible[:, None], values, penalties(excess, distance)[:, None]), admissible
 
     def _path(self, records: Sequence[_Record]) -> dict[str, Array]:
         parts = [record.first for record in records] + [record.found for record in records]
-        path: dict[str, Array] = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+        path = joined(parts)
         one = self.objectives[0] if len(self.objectives) == 1 else None
         path[SEARCHED_FOR] = np.full(len(path[POINT]), one, dtype=object)
         return path
@@ -168,14 +161,33 @@ class _Record:
             self._filter()
         if not self._parts:
             return {name: column[:0] for name, column in self.first.items()}
-        return _joined(self._parts)
+        return joined(self._parts)
 
     def _filter(self) -> None:
-        rows, values = _joined(self._parts), np.concatenate(self._values)
+        rows, values = joined(self._parts), np.concatenate(self._values)
         front = non_dominated(values)
         self._parts, self._values = [{name: column[front] for name, column in rows.items()}], [values[front]]
         self._new = 0
 
 
-def _joined(parts: Sequence[Rows]) -> Rows:
-    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+def latin_hypercube(variables: Sequence[Variable], population: int, seed: Sequence[int]) -> Floats:
+    """Return a Latin hypercube sample of a box, (p, n); each variable has a random stream of its own.
+
+    So searches of different laws with one seed begin with the same values of the variables that they share.
+    """
+    columns = []
+    for variable in variables:
+        random = np.random.default_rng([*seed, *variable.name.encode()])
+        places = (random.permutation(population) + random.random(population)) / population
+        columns.append(variable.lower + places * (variable.upper - variable.lower))
+    return np.stack(columns, axis=1)
+
+
+def penalties(excess: Floats, distance: Floats) -> Floats:
+    """Return what points that are no candidates count as, (n,): more than any objective.
+
+    In order, so that an algorithm sees which way is better: those beyond limits, by their `excess` over them where it
+    is positive; those that do not settle, by their `distance` at the horizon where it is finite; all others.
+    """
+    values = np.where(np.isfinite(distance), _UNSETTLED * (1.0 + np.minimum(distance, 100.0)), _WORST)
+    return np.where(excess > 0.0, _EXCESS * (1.0 + np.minimum(excess, 100.0)), values)

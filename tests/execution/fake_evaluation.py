@@ -93,9 +93,6 @@ class FakeEvaluation:
             "nodes": np.arange(size),
         }
 
-    def findings(self, rows: Mapping[str, Any]) -> list[str]:
-        return []
-
     def loop(self, design: Mapping[str, float]) -> ClosedLoop:
         return ClosedLoop(self.plant, PDAlpha(design["k_p_w"], design["k_d_w"], design["alpha_w"]))
 
