@@ -1,6 +1,45 @@
-"""Plants: what is controlled, with its component names and scales."""
+"""Plants: what is controlled, with its component names and scales.
 
+Plants with compiled kernels are loaded at first use.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from fracctl.plants.function import FunctionPlant
 from fracctl.plants.hcw import HCW, Chief, HCWInPlane, HCWOutOfPlane
 from fracctl.plants.linear import LinearPlant
+from fracctl.plants.state import Event, StatePlant
 
-__all__ = ["HCW", "Chief", "HCWInPlane", "HCWOutOfPlane", "LinearPlant"]
+if TYPE_CHECKING:
+    from fracctl.plants.libration import Libration
+    from fracctl.plants.relative_motion import RelativeMotion
+    from fracctl.plants.rotating_ellipsoid import RotatingEllipsoid
+
+__all__ = [
+    "HCW",
+    "Chief",
+    "Event",
+    "FunctionPlant",
+    "HCWInPlane",
+    "HCWOutOfPlane",
+    "Libration",
+    "LinearPlant",
+    "RelativeMotion",
+    "RotatingEllipsoid",
+    "StatePlant",
+]
+
+_COMPILED = {
+    "Libration": "libration",
+    "RelativeMotion": "relative_motion",
+    "RotatingEllipsoid": "rotating_ellipsoid",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name in _COMPILED:
+        return getattr(import_module(f"fracctl.plants.{_COMPILED[name]}"), name)
+    raise AttributeError(f"module 'fracctl.plants' has no attribute '{name}'")

@@ -9,10 +9,11 @@ from numpy.typing import ArrayLike
 
 from fracctl.arrays import Floats, finite
 from fracctl.errors import ArgumentError
+from fracctl.plants.state import SecondOrder
 from fracctl.units import Scales
 
 
-class LinearPlant:
+class LinearPlant(SecondOrder):
     """A linear plant with one control acceleration for each position.
 
         ξ'' = S ξ + D ξ' + υ
@@ -47,18 +48,19 @@ class LinearPlant:
             raise ArgumentError("components", self.components, f"must be {size} different names")
         self.scales = scales
 
-    @property
-    def n_controls(self) -> int:
-        """Number m of positions and of controls."""
-        return len(self.components)
+    def rates(self, t: Floats, x: Floats, u: Floats) -> Floats:
+        """Return x' of x = [ξ, ξ'], (b, 2m)."""
+        del t
+        m = self.n_controls
+        return np.concatenate([x[:, m:], x[:, :m] @ self.stiffness.T + x[:, m:] @ self.damping.T + u], axis=1)
 
-    @property
-    def state_names(self) -> tuple[str, ...]:
-        """Names of the 2m states: the positions, then their rates with the suffix ``_dot``."""
-        return self.components + tuple(f"{name}_dot" for name in self.components)
-
-    def __repr__(self) -> str:
-        return f"{type(self).__name__}({', '.join(self.components)})"
+    def jacobians(self, t: Floats, x: Floats, u: Floats) -> tuple[Floats, Floats]:
+        """Return ∂f/∂x, (b, 2m, 2m), and ∂f/∂u, (b, 2m, m), which do not depend on t, x and u."""
+        del t, u
+        m = self.n_controls
+        one, none = np.eye(m), np.zeros((m, m))
+        state, control = np.block([[none, one], [self.stiffness, self.damping]]), np.concatenate([none, one])
+        return np.broadcast_to(state, (len(x), 2 * m, 2 * m)), np.broadcast_to(control, (len(x), 2 * m, m))
 
 
 def _square(name: str, value: ArrayLike) -> Floats:

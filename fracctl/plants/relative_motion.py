@@ -1,0 +1,107 @@
+"""Nonlinear motion relative to a leader on a Kepler orbit."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from fracctl.arrays import Floats
+from fracctl.compiling import compiled_with
+from fracctl.errors import ArgumentError
+from fracctl.plants.hcw import Chief
+from fracctl.plants.state import SecondOrder
+
+
+class RelativeMotion(SecondOrder):
+    """The position of a follower in the frame `rtn` of a leader on a circular or elliptic orbit, both point masses.
+
+        x'' = 2ωy' + ω'y + ω²x + g_x + υ_x,    y'' = -2ωx' - ω'x + ω²y + g_y + υ_y,    z'' = g_z + υ_z
+
+    with x radial outward, y along-track, z along the orbit normal, and the difference g of the two attractions, which
+    is computed without cancellation:
+
+        g = -[x - r f, y, z]/(r³ (1 + f)),    f = (1 + q)^{3/2} - 1 = q (3 + 3q + q²)/(1 + (1 + q)^{3/2}),
+        q = (2rx + x² + y² + z²)/r²
+
+    Lengths over the leader's semi-major axis a, time over 1/n; at time 0 the leader is at perigee. Its radius r and
+    rate ω come from Kepler's equation.
+
+    Args:
+        leader: the orbit's semi-major axis and the gravitational parameter.
+        eccentricity: e in [0, 1).
+
+    Raises:
+        ArgumentError: the orbit is not an ellipse.
+    """
+
+    components = ("x", "y", "z")
+
+    def __init__(self, leader: Chief | None = None, eccentricity: float = 0.0) -> None:
+        if not 0.0 <= eccentricity < 1.0:
+            raise ArgumentError("eccentricity", eccentricity, "must lie in [0, 1)")
+        self.leader = leader or Chief(semi_major_axis_km=6700.0)
+        self.eccentricity = float(eccentricity)
+        self.scales = self.leader.scales
+
+    def leader_motion(self, t: Floats) -> Floats:
+        """Return r, ω and ω' at times (b,), (b, 3)."""
+        return _leader(np.ascontiguousarray(t), self.eccentricity)
+
+    def rates(self, t: Floats, x: Floats, u: Floats) -> Floats:
+        """Return x' of x = [x, y, z, x', y', z'], (b, 6)."""
+        return _rates(_leader(t, self.eccentricity), x, u)
+
+    def jacobians(self, t: Floats, x: Floats, u: Floats) -> tuple[Floats, Floats]:
+        """Return ∂f/∂x, (b, 6, 6), and ∂f/∂u, (b, 6, 3)."""
+        r, omega, omega_dot = self.leader_motion(t).T
+        place = x[:, :3] + r[:, None] * np.array([1.0, 0.0, 0.0])
+        square = (place**2).sum(axis=1)
+        state, control = np.zeros((len(x), 6, 6)), np.zeros((len(x), 6, u.shape[1]))
+        state[:, :3, 3:] = control[:, 3:] = np.eye(3)
+        outer = place[:, :, None] * place[:, None, :]
+        state[:, 3:, :3] = (3.0 * outer / square[:, None, None] - np.eye(3)) * square[:, None, None] ** -1.5
+        state[:, 3, 0] += omega**2
+        state[:, 4, 1] += omega**2
+        state[:, 3, 1] += omega_dot
+        state[:, 4, 0] -= omega_dot
+        state[:, 3, 4], state[:, 4, 3] = 2.0 * omega, -2.0 * omega
+        return state, control
+
+
+@compiled_with(error_model="numpy")
+def _leader(t: Floats, e: float) -> Floats:
+    """Return r, ω, ω' of a Kepler orbit with a = n = 1, (b, 3)."""
+    out = np.empty((len(t), 3))
+    momentum = math.sqrt(1.0 - e * e)
+    for i in range(len(t)):
+        mean = t[i] - 2.0 * math.pi * math.floor(t[i] / (2.0 * math.pi) + 0.5)
+        anomaly = mean + math.copysign(0.85 * e, mean)
+        for _ in range(50):
+            step = (anomaly - e * math.sin(anomaly) - mean) / (1.0 - e * math.cos(anomaly))
+            anomaly -= step
+            if abs(step) < 1e-15:
+                break
+        r = 1.0 - e * math.cos(anomaly)
+        omega = momentum / (r * r)
+        out[i, 0] = r
+        out[i, 1] = omega
+        out[i, 2] = -2.0 * e * math.sin(anomaly) / r * omega / r
+    return out
+
+
+@compiled_with(error_model="numpy")
+def _rates(leader: Floats, x: Floats, u: Floats) -> Floats:
+    out = np.empty_like(x)
+    for i in range(len(x)):
+        r, omega, omega_dot = leader[i, 0], leader[i, 1], leader[i, 2]
+        px, py, pz = x[i, 0], x[i, 1], x[i, 2]
+        q = (2.0 * r * px + px * px + py * py + pz * pz) / (r * r)
+        root = (1.0 + q) * math.sqrt(1.0 + q)
+        f = q * (3.0 + q * (3.0 + q)) / (1.0 + root)
+        pull = 1.0 / (r * r * r * root)
+        out[i, 0], out[i, 1], out[i, 2] = x[i, 3], x[i, 4], x[i, 5]
+        out[i, 3] = 2.0 * omega * x[i, 4] + omega_dot * py + omega * omega * px - pull * (px - r * f) + u[i, 0]
+        out[i, 4] = -2.0 * omega * x[i, 3] - omega_dot * px + omega * omega * py - pull * py + u[i, 1]
+        out[i, 5] = -pull * pz + u[i, 2]
+    return out
