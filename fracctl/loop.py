@@ -3,16 +3,27 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import StrEnum
 from functools import cached_property
 
 import numpy as np
 
 from fracctl.arrays import Floats, batch_size
-from fracctl.controllers.linear import LinearLaw, ModelBasedLaw
-from fracctl.errors import ArgumentError
+from fracctl.controllers.delayed_feedback import DelayedLaw, DelayedTerm
+from fracctl.controllers.linear import LinearLaw, LinearLawTerms, ModelBasedLaw
+from fracctl.errors import ArgumentError, UnsupportedError
 from fracctl.fractional.system import LinearFractionalSystem
 from fracctl.fractional.terms import FractionalTerm
 from fracctl.plants.linear import LinearPlant
+from fracctl.plants.state import StatePlant
+
+
+class Need(StrEnum):
+    """What a solver must be able to do."""
+
+    FRACTIONAL_TERMS = "fractional terms"
+    NONLINEAR_PLANT = "a nonlinear plant"
+    DELAYS = "delayed states"
 
 
 @dataclass(frozen=True)
@@ -21,29 +32,55 @@ class ClosedLoop:
 
     Args:
         plant: what is controlled, e.g. `fracctl.plants.HCWOutOfPlane()`.
-        controller: the law, e.g. `fracctl.controllers.PDAlpha(k_p=0.85, k_d=2.0, alpha=0.91)`.
+        controller: the law, e.g. `fracctl.controllers.PDAlpha(k_p=0.85, k_d=2.0, alpha=0.91)`; None for free motion.
 
     Raises:
         ArgumentError: the shapes of the law's gains do not fit the plant.
+        UnsupportedError: the law takes linear plants only, and this one is not.
     """
 
-    plant: LinearPlant
-    controller: LinearLaw | ModelBasedLaw
+    plant: LinearPlant | StatePlant
+    controller: LinearLaw | ModelBasedLaw | DelayedLaw | None = None
 
     def __post_init__(self) -> None:
-        self.system  # noqa: B018 - a wrong shape is refused here, where the user sees which loop it is
+        self.batch  # noqa: B018 - a wrong shape is refused here, where the user sees which loop it is
+
+    @property
+    def needs(self) -> frozenset[Need]:
+        """What a solver of this loop must be able to do; nothing for the free motion of a linear plant."""
+        needs = set()
+        if not isinstance(self.plant, LinearPlant):
+            needs.add(Need.NONLINEAR_PLANT)
+        if isinstance(self.controller, DelayedLaw):
+            needs.add(Need.DELAYS)
+        elif self.controller is not None:
+            needs.add(Need.FRACTIONAL_TERMS)
+        return frozenset(needs)
+
+    @cached_property
+    def delayed_terms(self) -> tuple[DelayedTerm, ...]:
+        """The delayed terms of the control."""
+        law = self.controller
+        return law.delayed_terms(self.plant.n_states, self.plant.n_controls) if isinstance(law, DelayedLaw) else ()
 
     @cached_property
     def system(self) -> LinearFractionalSystem:
-        """The loop as a linear fractional system."""
-        m = self.plant.n_controls
-        given = self.controller
-        law = (given.for_plant(self.plant) if isinstance(given, ModelBasedLaw) else given).linear_terms(m)
+        """The loop as a linear fractional system.
+
+        Raises:
+            UnsupportedError: it is not one.
+        """
+        plant, given = self.plant, self.controller
+        if not isinstance(plant, LinearPlant) or isinstance(given, DelayedLaw):
+            found = " and ".join(sorted(self.needs))
+            raise UnsupportedError(f"a linear fractional loop is asked for, but this one has {found}")
+        m = plant.n_controls
+        law = _terms(plant, given)
         q = law.n_auxiliary
         identity = FractionalTerm(np.eye(m + q), np.array([2.0] * m + [1.0] * q))
         free = [
-            FractionalTerm(_pad(-self.plant.damping, 0, q, q), np.ones(m + q)),
-            FractionalTerm(_pad(-self.plant.stiffness, 0, q, q), np.zeros(m + q)),
+            FractionalTerm(_pad(-plant.damping, 0, q, q), np.ones(m + q)),
+            FractionalTerm(_pad(-plant.stiffness, 0, q, q), np.zeros(m + q)),
         ]
         feedback = [FractionalTerm(_pad(-term.matrix, 0, q, 0), term.orders) for term in law.control]
         memory = [FractionalTerm(_pad(-term.matrix, m, 0, 0), term.orders) for term in law.auxiliary]
@@ -58,6 +95,15 @@ class ClosedLoop:
     @property
     def batch(self) -> int | None:
         """Batch size b, None for a single loop."""
+        if self.delayed_terms:
+            sizes = {term.batch for term in self.delayed_terms} - {None}
+            if len(sizes - {1}) > 1:
+                raise ArgumentError(
+                    "controller", f"a sum of batches of {sorted(map(str, sizes))}", "must have one size"
+                )
+            return max((size for size in sizes if size is not None), default=None)
+        if self.controller is None:
+            return None
         return self.system.batch
 
     def initial_values(self, initial_state: Floats) -> tuple[Floats, Floats]:
@@ -74,6 +120,14 @@ class ClosedLoop:
         value = np.concatenate([initial_state[..., :m], z0], axis=-1)
         rate = np.concatenate([initial_state[..., m : 2 * m], np.zeros((*lead, q))], axis=-1)
         return value, rate
+
+
+def _terms(plant: LinearPlant, law: LinearLaw | ModelBasedLaw | None) -> LinearLawTerms:
+    """Return a linear law as data; free motion has one term that is zero."""
+    m = plant.n_controls
+    if law is None:
+        return LinearLawTerms((FractionalTerm(np.zeros((m, m)), np.zeros(m)),))
+    return (law.for_plant(plant) if isinstance(law, ModelBasedLaw) else law).linear_terms(m)
 
 
 def _pad(matrix: Floats, rows_before: int, rows_after: int, columns_after: int) -> Floats:

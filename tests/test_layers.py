@@ -24,6 +24,7 @@ BOTTOM_UP = (
     "polynomials",
     "features",
     "trajectory",
+    "stepwise",
     "solvers",
     "stability",
     "design",

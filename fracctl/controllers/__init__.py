@@ -1,5 +1,6 @@
 """Control laws."""
 
+from fracctl.controllers.delayed_feedback import DelayedFeedback, DelayedLaw, DelayedSum, DelayedTerm
 from fracctl.controllers.linear import LinearLaw, LinearLawTerms
 from fracctl.controllers.parameters import Parameter
 from fracctl.controllers.pd import PD
@@ -9,4 +10,18 @@ from fracctl.controllers.pdd_alpha import PDDAlpha
 from fracctl.controllers.pi_lambda_d_mu import PILambdaDMu
 from fracctl.controllers.pid import PID
 
-__all__ = ["PD", "PID", "LinearLaw", "LinearLawTerms", "PDAlpha", "PDDAlpha", "PDLag", "PILambdaDMu", "Parameter"]
+__all__ = [
+    "PD",
+    "PID",
+    "DelayedFeedback",
+    "DelayedLaw",
+    "DelayedSum",
+    "DelayedTerm",
+    "LinearLaw",
+    "LinearLawTerms",
+    "PDAlpha",
+    "PDDAlpha",
+    "PDLag",
+    "PILambdaDMu",
+    "Parameter",
+]

@@ -14,12 +14,14 @@ from fracctl.solvers.solve import solve
 if TYPE_CHECKING:
     from fracctl.solvers.collocation import Collocation
     from fracctl.solvers.contour import Contour
+    from fracctl.solvers.method_of_steps import MethodOfSteps
     from fracctl.solvers.volterra import Volterra
 
-__all__ = ["Collocation", "Contour", "Solver", "Survey", "Volterra", "solve"]
+__all__ = ["Collocation", "Contour", "MethodOfSteps", "Solver", "Survey", "Volterra", "solve"]
 
 
 def __getattr__(name: str) -> Any:
     if name in __all__:
-        return getattr(import_module(f"fracctl.solvers.{name.lower()}"), name)
+        module = "".join(f"_{c.lower()}" if c.isupper() else c for c in name).lstrip("_")
+        return getattr(import_module(f"fracctl.solvers.{module}"), name)
     raise AttributeError(f"module 'fracctl.solvers' has no attribute '{name}'")

@@ -15,7 +15,7 @@ from fracctl.characteristic.matrix import CharacteristicMatrix
 from fracctl.characteristic.winding import abscissa_bound, unstable_zeros
 from fracctl.errors import UnsupportedError
 from fracctl.fractional.system import LinearFractionalSystem
-from fracctl.loop import ClosedLoop
+from fracctl.loop import ClosedLoop, Need
 from fracctl.solvers.base import Survey
 from fracctl.solvers.members import Members, common_batch, equal_orders, positive
 from fracctl.solvers.results import merged, without_trajectory
@@ -40,10 +40,11 @@ class BatchSolver(ABC):
 
     def supports(self, loop: ClosedLoop) -> str | None:
         """Return None for a linear fractional loop, otherwise why it is refused and what to use instead."""
-        system = getattr(loop, "system", None)
-        if isinstance(system, LinearFractionalSystem):
-            return self._refusal(system)
-        return f"the {self.name} solver takes linear loops only; use 'method_of_steps' for nonlinear or delayed ones"
+        beyond = sorted(loop.needs - {Need.FRACTIONAL_TERMS})
+        if not beyond:
+            return self._refusal(loop.system)
+        found = " and ".join(beyond)
+        return f"the {self.name} solver takes linear fractional loops, but this one has {found}; use 'method_of_steps'"
 
     def solve(self, loop: ClosedLoop, initial_state: ArrayLike, horizon: float) -> Trajectory:
         """Return the trajectories of all members on one grid.

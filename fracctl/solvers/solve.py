@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from importlib import import_module
+from typing import TYPE_CHECKING, Literal, overload
 
 from numpy.typing import ArrayLike
 
@@ -10,6 +11,9 @@ from fracctl.errors import ArgumentError, suggestion
 from fracctl.loop import ClosedLoop
 from fracctl.solvers.batched import BatchSolver
 from fracctl.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from fracctl.stepwise import StepwiseTrajectory
 
 _SOLVERS = {"contour": "Contour", "volterra": "Volterra", "collocation": "Collocation"}
 """Class in the module of the name, which is loaded at first use."""
@@ -27,25 +31,60 @@ def make_solver(name: str, tolerance: float | None = None) -> BatchSolver:
     return kind() if tolerance is None else kind(tolerance=tolerance)  # type: ignore[call-arg]
 
 
+@overload
+def solve(
+    loop: ClosedLoop,
+    initial_state: ArrayLike,
+    horizon: float,
+    solver: Literal["contour", "volterra", "collocation"] = ...,
+    tolerance: float | None = ...,
+) -> Trajectory: ...
+
+
+@overload
+def solve(
+    loop: ClosedLoop,
+    initial_state: ArrayLike,
+    horizon: float,
+    solver: Literal["method_of_steps"],
+    tolerance: float | None = ...,
+) -> StepwiseTrajectory: ...
+
+
+@overload
+def solve(
+    loop: ClosedLoop, initial_state: ArrayLike, horizon: float, solver: str, tolerance: float | None = ...
+) -> Trajectory | StepwiseTrajectory: ...
+
+
 def solve(
     loop: ClosedLoop,
     initial_state: ArrayLike,
     horizon: float,
     solver: str = "contour",
     tolerance: float | None = None,
-) -> Trajectory:
+) -> Trajectory | StepwiseTrajectory:
     """Solve a closed loop.
 
     Args:
         loop: plant and law, of b members or a single one.
-        initial_state: [ξ(0), ξ'(0)], (n,) or (b, n), dimensionless.
+        initial_state: [ξ(0), ξ'(0)], or x(0) of a plant in state form, (n,) or (b, n), dimensionless.
         horizon: last time, dimensionless.
-        solver: ``contour``, ``volterra`` or ``collocation``.
+        solver: ``contour``, ``volterra`` or ``collocation`` for linear fractional loops, ``method_of_steps`` for
+            delayed feedback and free motion, nonlinear plants included.
         tolerance: error relative to the peaks of positions and controls above which a trajectory is ``failed``; None
-            for the solver's own, 1e-8 (1e-2 for ``collocation``, which is not made for more).
+            for the solver's own, 1e-8 (1e-2 for ``collocation``, which is not made for more; any for
+            ``method_of_steps``, which tells its error in `error_estimate`).
 
     Raises:
         ArgumentError: an argument is out of range, has a wrong shape, or names no solver.
         UnsupportedError: the solver does not take this loop.
     """
+    if solver == "method_of_steps":
+        from fracctl.solvers.method_of_steps import MethodOfSteps
+
+        return MethodOfSteps(tolerance=tolerance or 0.0).solve(loop, initial_state, horizon)
+    if solver not in _SOLVERS:
+        known = sorted([*_SOLVERS, "method_of_steps"])
+        raise ArgumentError("solver", repr(solver), f"must be one of {known}{suggestion(solver, known)}")
     return make_solver(solver, tolerance).solve(loop, initial_state, horizon)

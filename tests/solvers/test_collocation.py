@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fracctl.controllers import PDAlpha
+from fracctl.controllers import DelayedFeedback, PDAlpha
 from fracctl.errors import ArgumentError, UnsupportedError
 from fracctl.loop import ClosedLoop
-from fracctl.plants import HCWInPlane, HCWOutOfPlane
+from fracctl.plants import FunctionPlant, HCWInPlane, HCWOutOfPlane
 from fracctl.solvers import Collocation, solve
 from fracctl.solvers.blocks import solve_each
 from tests.references import loops, poles, series
@@ -139,8 +139,10 @@ def test_unknown_forms_and_tolerances_are_refused() -> None:
 
 
 def test_what_is_not_linear_is_refused_with_the_solver_to_use() -> None:
-    with pytest.raises(UnsupportedError, match="takes linear loops only; use 'method_of_steps'"):
-        Collocation().solve(object(), np.zeros(2), 1.0)  # type: ignore[arg-type]
+    loop = ClosedLoop(FunctionPlant(lambda t, x, u: u - x**3, 1, 1), DelayedFeedback([[1.0]], 1.0))
+    sentence = "takes linear fractional loops, but this one has a nonlinear plant and delayed states; use 'method_of_st"
+    with pytest.raises(UnsupportedError, match=sentence):
+        Collocation().solve(loop, np.zeros(1), 1.0)
 
 
 def test_hopeless_equations_come_out_as_failed() -> None:

@@ -1,0 +1,153 @@
+"""Time-delayed feedback: the control is what the state has changed by since one delay ago."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fracctl.arrays import Booleans, Floats, batch_size, finite
+from fracctl.errors import ArgumentError
+
+History = Callable[[Floats], Floats]
+"""Takes times (b, k) before 0 and returns states (b, k, n), or what broadcasts to them."""
+
+
+@dataclass(frozen=True)
+class DelayedTerm:
+    """One term -K (x - W) of a control, with W(t) = (1 - R) x(t - τ) + R W(t - τ), from `switch_on` on."""
+
+    gain: Floats
+    """K, (m, n) or (b, m, n)."""
+    delay: Floats
+    """τ, () or (b,)."""
+    recall: Floats
+    """R, () or (b,)."""
+    switch_on: Floats
+    """() or (b,)."""
+
+    @property
+    def batch(self) -> int | None:
+        """Batch size, None for a single law."""
+        return batch_size(
+            gain=(self.gain, 2), delay=(self.delay, 0), recall=(self.recall, 0), switch_on=(self.switch_on, 0)
+        )
+
+    def of(self, batch: int) -> DelayedTerm:
+        """Return the term with a batch axis of the given size everywhere."""
+        gain = np.ascontiguousarray(np.broadcast_to(self.gain, (batch, *self.gain.shape[-2:])))
+        numbers = (np.broadcast_to(v, (batch,)) for v in (self.delay, self.recall, self.switch_on))
+        return DelayedTerm(gain, *numbers)
+
+
+@runtime_checkable
+class DelayedLaw(Protocol):
+    """A law that is a sum of delayed terms."""
+
+    history: History | None
+    """The states before time 0; None where the law does not ask for them."""
+    history_breaks: tuple[float, ...]
+    """Times in (-τ, 0) at which the history is not smooth."""
+
+    def delayed_terms(self, n_states: int, n_controls: int) -> tuple[DelayedTerm, ...]:
+        """Return the terms for a plant with n states and m controls."""
+        ...
+
+
+class DelayedFeedback:
+    """Time-delayed feedback control (Pyragas; Biggs and McInnes, Eq. 1), or with a recall its extended form (Socolar).
+
+        u(t) = -K (x(t) - W(t)),        W(t) = (1 - R) x(t - τ) + R W(t - τ),        t ≥ switch_on
+
+    and u = 0 before. An orbit of period τ needs no control. W = x as long as x(t - τ) is not known.
+
+    Args:
+        gain: K, (m, n), or (b, m, n) for a batch; a control over a state.
+        delay: τ > 0, () or (b,); time.
+        switch_on: when control begins, () or (b,); None for τ. It may be earlier than τ only with a history.
+        history: the states before time 0: None for a free motion that begins at time 0, a constant () or (n,), or a
+            function of times (b, k) that returns states (b, k, n).
+        recall: R in [0, 1), () or (b,); 0 for the plain law.
+        history_breaks: times in (-τ, 0) at which a history given as a function jumps or has a kink.
+
+    Raises:
+        ArgumentError: a number is out of its range, control begins before there is anything to compare with, or (where
+            the plant is known) the gain has a wrong shape.
+    """
+
+    def __init__(
+        self,
+        gain: ArrayLike,
+        delay: ArrayLike,
+        switch_on: ArrayLike | None = None,
+        history: ArrayLike | History | None = None,
+        recall: ArrayLike = 0.0,
+        history_breaks: ArrayLike = (),
+    ) -> None:
+        self.gain, self.delay = finite("gain", gain), finite("delay", delay)
+        self.switch_on = self.delay if switch_on is None else finite("switch_on", switch_on)
+        self.recall = finite("recall", recall)
+        breaks = np.atleast_1d(finite("history_breaks", history_breaks))
+        self.history_breaks = tuple(float(b) for b in breaks)
+        self.history = _history(history)
+        _all("delay", self.delay, self.delay > 0.0, "must be positive")
+        _all("recall", self.recall, (self.recall >= 0.0) & (self.recall < 1.0), "must lie in [0, 1)")
+        early = self.switch_on < (self.delay if self.history is None else 0.0)
+        allowed = "must not lie before time 0" if self.history else "must not lie before the delay without a history"
+        _all("switch_on", self.switch_on, ~early, allowed)
+        for name in ("delay", "recall", "switch_on"):
+            if getattr(self, name).ndim > 1:
+                raise ArgumentError(name, f"of shape {getattr(self, name).shape}", "must have shape () or (b,)")
+
+    def delayed_terms(self, n_states: int, n_controls: int) -> tuple[DelayedTerm, ...]:
+        """Return the one term of the law.
+
+        Raises:
+            ArgumentError: the gain does not fit.
+        """
+        if self.gain.ndim not in (2, 3) or self.gain.shape[-2:] != (n_controls, n_states):
+            shape = f"({n_controls}, {n_states})"
+            allowed = f"must have shape {shape} or (b, {n_controls}, {n_states}) for this plant"
+            raise ArgumentError("gain", f"of shape {self.gain.shape}", allowed)
+        return (DelayedTerm(self.gain, self.delay, self.recall, self.switch_on),)
+
+
+class DelayedSum:
+    """The sum of several delayed feedbacks, each with a delay of its own; they share the history of the first.
+
+    Args:
+        laws: two or more.
+
+    Raises:
+        ArgumentError: there are fewer than two, or another than the first has a history.
+    """
+
+    def __init__(self, *laws: DelayedFeedback) -> None:
+        if len(laws) < 2:
+            raise ArgumentError("laws", f"a number of {len(laws)}", "must be two or more")
+        if any(law.history is not None for law in laws[1:]):
+            raise ArgumentError("history", "given with another than the first law", "must be given with the first")
+        self.laws = laws
+        self.history, self.history_breaks = laws[0].history, laws[0].history_breaks
+
+    def delayed_terms(self, n_states: int, n_controls: int) -> tuple[DelayedTerm, ...]:
+        """Return the terms of all laws."""
+        return tuple(term for law in self.laws for term in law.delayed_terms(n_states, n_controls))
+
+
+def _history(given: ArrayLike | History | None) -> History | None:
+    if given is None or callable(given):
+        return given
+    constant = finite("history", given)
+    if constant.ndim > 1:
+        raise ArgumentError("history", f"of shape {constant.shape}", "must be a function or have shape () or (n,)")
+    return lambda times: np.broadcast_to(constant, (*times.shape, constant.size))
+
+
+def _all(name: str, values: Floats, good: Booleans, allowed: str) -> None:
+    wrong = values[~np.broadcast_to(good, values.shape)]
+    if wrong.size:
+        raise ArgumentError(name, float(wrong.flat[0]), allowed)
