@@ -25,8 +25,10 @@ def first_times(event: Event, steps: Steps, first: int, stop: int, members: Arra
     states = (dop853.basis(_PLACES) @ rows.reshape(count, dop853.ROWS, r * n)).reshape(-1, n)
     below = (event.function(times.ravel(), states) < 0.0).reshape(count * len(_PLACES), r)
     found = np.flatnonzero(below.any(axis=0))
-    step, place = np.divmod(np.argmax(below[:, found], axis=0), len(_PLACES))
     out = np.full(r, np.nan)
+    if not found.size:
+        return out
+    step, place = np.divmod(np.argmax(below[:, found], axis=0), len(_PLACES))
     pieces = rows[step, :, found]
     high = _PLACES[place]
     low = np.where(place > 0, _PLACES[place - 1], 0.0)

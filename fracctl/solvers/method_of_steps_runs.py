@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from fracctl.arrays import Floats
+from fracctl.compiling import compiled
 from fracctl.controllers.delayed_feedback import DelayedTerm, History
 from fracctl.plants.state import StatePlant
 from fracctl.solvers import dop853
@@ -67,7 +68,18 @@ def _step(plant: StatePlant, times: Floats, h: Floats, x: Floats, control: Contr
 
 def _feedback(gain: Floats, reference: Floats) -> Control:
     """Return -K (x - W) with K (b, m, n) and W (16, b, n)."""
-    return lambda s, x: -np.einsum("bmn,bn->bm", gain, x - reference[s])
+    return lambda s, x: _fed_back(gain, reference[s], x)
+
+
+@compiled
+def _fed_back(gain: Floats, reference: Floats, x: Floats) -> Floats:
+    members, controls, states = gain.shape
+    out = np.zeros((members, controls))
+    for b in range(members):
+        for i in range(controls):
+            for j in range(states):
+                out[b, i] -= gain[b, i, j] * (x[b, j] - reference[b, j])
+    return out
 
 
 def _on_the_grid(terms: Sequence[DelayedTerm], mesh: Mesh, steps: Steps) -> Callable[[int, Floats], Control]:
@@ -129,7 +141,7 @@ def _by_looking_up(terms: Sequence[DelayedTerm], steps: Steps, n_controls: int) 
             known = middles[:, k] > (0.0 if steps.history is not None else term.delay)
             on = known & (middles[:, k] > term.switch_on)
             if on.any():
-                reference = np.swapaxes(steps.reference(term, inside), 0, 1)
+                reference = np.ascontiguousarray(np.swapaxes(steps.reference(term, inside), 0, 1))
                 reference[:, ~on] = 0.0
                 parts.append(_feedback(term.gain * on[:, None, None], reference))
         return lambda s, x: sum((part(s, x) for part in parts), free)
