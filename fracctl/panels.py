@@ -122,6 +122,12 @@ class PanelGrid:
         for i, panel in enumerate(self.panels):
             self.times[self.offsets[i]], self.times[self.offsets[i + 1] - 1] = panel.start, panel.end
 
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, PanelGrid) and self.panels == other.panels
+
+    def __hash__(self) -> int:
+        return hash(self.panels)
+
     @cached_property
     def nodes(self) -> Floats:
         """y and barycentric weights, (2, T)."""

@@ -7,7 +7,7 @@ import numpy as np
 from fracctl.arrays import Floats
 from fracctl.errors import ArgumentError
 from fracctl.features import absolute_integral
-from fracctl.measures.samples import Samples
+from fracctl.measures.samples import samples_of
 from fracctl.trajectory import Trajectory
 
 
@@ -46,7 +46,7 @@ class ControlEffort:
 
     def _sampled(self, trajectory: Trajectory) -> Floats:
         assert self.resolution is not None
-        samples, initial = Samples(trajectory.grid, self.resolution), trajectory.initial_controls
+        samples, initial = samples_of(trajectory.grid, self.resolution), trajectory.initial_controls
         controls = np.where(trajectory.missing[:, None, None], 0.0, trajectory.controls_at_nodes)
         components = [samples.absolute_integral(controls[:, i], initial[:, i]) for i in range(controls.shape[1])]
         return np.where(trajectory.missing, np.inf, np.sum(components, axis=0))

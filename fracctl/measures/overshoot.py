@@ -7,7 +7,7 @@ import numpy as np
 from fracctl.arrays import Floats
 from fracctl.errors import ArgumentError
 from fracctl.features import largest_excursion
-from fracctl.measures.samples import Samples
+from fracctl.measures.samples import samples_of
 from fracctl.trajectory import Trajectory
 
 DEFINITIONS = ("past_equilibrium", "largest_extremum")
@@ -55,12 +55,14 @@ class Overshoot:
     def _sampled(self, trajectory: Trajectory, start: Floats, side: Floats) -> Floats:
         """Return the largest samples, (b, m); +inf where there is no trajectory."""
         assert self.resolution is not None
-        samples, past = Samples(trajectory.grid, self.resolution), self.definition == "past_equilibrium"
+        samples, past = samples_of(trajectory.grid, self.resolution), self.definition == "past_equilibrium"
         largest = np.empty_like(start)
         for i in range(start.shape[1]):
             values, initial = trajectory.positions[:, i], start[:, i]
-            whole = samples.largest_excursion(values, initial, side[:, i])
-            largest[:, i] = whole if past else samples.largest_extremum(values, initial)
+            if past:
+                largest[:, i] = samples.largest_excursion(values, initial, side[:, i])
+            else:
+                largest[:, i] = samples.largest_extremum(values, initial)
         return np.where(trajectory.missing[:, None], np.inf, largest)
 
 

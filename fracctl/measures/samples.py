@@ -3,18 +3,34 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import lru_cache
 
 import numpy as np
 
 from fracctl.arrays import Floats
 from fracctl.errors import ArgumentError
 from fracctl.panels import PanelGrid, interpolation
+from fracctl.polynomials import comparing, over_rows
 
 MOST_SAMPLES = 1_000_000
 """More samples than this up to the horizon are a misprint of the resolution."""
 
 _VALUES_IN_CHUNK = 2**18
 """Samples of all members that are held at once; 2 MB stay in the processor's cache."""
+
+_MOST_SHARED = 20_000
+"""Samples whose matrices are kept for other trajectories on the same panels; they take some 5 MB a grid."""
+
+
+def samples_of(grid: PanelGrid, resolution: float) -> Samples:
+    """Return the samples of a grid, made once for groups of trajectories on the same panels; see `Samples`."""
+    few = grid.horizon <= _MOST_SHARED * resolution
+    return _shared(grid, resolution) if few else Samples(grid, resolution)
+
+
+@lru_cache(maxsize=16)
+def _shared(grid: PanelGrid, resolution: float) -> Samples:
+    return Samples(grid, resolution)
 
 
 class Samples:
@@ -45,18 +61,19 @@ class Samples:
                 self._parts.append((nodes, slice(int(first), int(stop)), matrix))
 
     def of(self, values: Floats, initial: Floats) -> Iterator[tuple[slice, Floats]]:
-        """Yield the samples of some members at a time: which members, and their samples (r, t).
+        """Yield the samples of some members at a time: which members, and their samples (r, t), until the next.
 
         Args:
             values: at the nodes of the grid, (b, T).
             initial: at time 0, (b,).
         """
         size = max(1, _VALUES_IN_CHUNK // len(self.times))
+        room = np.empty((min(size, len(values)), len(self.times)))
         for start in range(0, len(values), size):
             members = slice(start, min(start + size, len(values)))
-            samples = np.empty((members.stop - start, len(self.times)))
+            samples = room[: members.stop - start]
             for nodes, where, matrix in self._parts:
-                samples[:, where] = values[members, nodes] @ matrix
+                np.matmul(values[members, nodes], matrix, out=samples[:, where])
             samples[:, 0] = initial[members]
             yield members, samples
 
@@ -73,17 +90,34 @@ class Samples:
         """Return the largest sample, at least 0, of side · values, or of ± values where side is 0, as (b,)."""
         largest = np.zeros(len(values))
         for members, samples in self.of(values, initial):
-            for sign in (-1.0, 1.0):
-                asked = np.flatnonzero(side[members] != -sign)
-                tops = (sign * samples[asked]).max(axis=1)
-                largest[members][asked] = np.maximum(largest[members][asked], tops)
+            above, below = samples.max(axis=1), -samples.min(axis=1)
+            tops = np.where(side[members] == 0.0, np.maximum(above, below), np.where(side[members] > 0.0, above, below))
+            largest[members] = np.maximum(tops, 0.0)
         return largest
 
     def largest_extremum(self, values: Floats, initial: Floats) -> Floats:
         """Return the largest |sample| that lies above or below both its neighbours, 0 if there is none, as (b,)."""
         largest = np.zeros(len(values))
         for members, samples in self.of(values, initial):
-            rises = np.diff(samples)
-            turns = rises[:, :-1] * rises[:, 1:] <= 0.0
-            largest[members] = np.max(np.abs(samples[:, 1:-1]), axis=1, where=turns, initial=0.0)
+            largest[members] = _largest_turns(samples)
         return largest
+
+
+@over_rows
+def _largest_turns(samples: Floats) -> Floats:
+    """Largest |sample| of each row between a rise and a fall."""
+    largest = np.empty(len(samples))
+    for i in range(len(samples)):
+        largest[i] = _largest_turn(samples[i])
+    return largest
+
+
+@comparing
+def _largest_turn(row: Floats) -> float:
+    """Largest |sample| of a row between a rise and a fall, 0 if there is none."""
+    largest, one = 0.0, np.uint64(1)
+    for j in range(one, np.uint64(max(len(row) - 1, 1))):
+        here = row[j]
+        height = abs(here) if (here - row[j - one]) * (row[j + one] - here) <= 0.0 else 0.0
+        largest = height if height > largest else largest
+    return largest

@@ -7,7 +7,8 @@ import pytest
 
 from fracctl.errors import ArgumentError
 from fracctl.measures import ControlEffort, Overshoot, control_effort, overshoot
-from fracctl.measures.samples import MOST_SAMPLES, Samples
+from fracctl.measures.samples import MOST_SAMPLES, Samples, samples_of
+from fracctl.panels import PanelGrid
 from tests.references import loops, poles
 from tests.references.laplace import QuickReference
 from tests.references.loops import Floats
@@ -119,3 +120,16 @@ def test_refusals() -> None:
     grid = solve(OUT_OF_PLANE[:1], 1.0).grid
     with pytest.raises(ArgumentError, match=f"at most {MOST_SAMPLES} samples"):
         Samples(grid, 1e-9)
+
+
+def test_equal_panels_share_their_samples() -> None:
+    panels = solve(OUT_OF_PLANE[:1], HORIZON).grid.panels
+    one, two = PanelGrid(panels), PanelGrid(panels)
+    assert samples_of(one, 0.01) is samples_of(two, 0.01)
+    assert samples_of(one, 0.01) is not samples_of(one, 0.02)
+    assert samples_of(one, 0.01) is not samples_of(PanelGrid(panels[:-1]), 0.01)
+
+
+def test_many_samples_are_not_kept() -> None:
+    grid = solve(OUT_OF_PLANE[:1], HORIZON).grid
+    assert samples_of(grid, 1e-3) is not samples_of(grid, 1e-3)
