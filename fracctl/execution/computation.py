@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import Executor
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import Any
@@ -15,13 +16,14 @@ from fracctl.errors import RunError
 from fracctl.evaluation import COUNTERS, Conclusion
 from fracctl.execution.cross_check import CrossCheck
 from fracctl.execution.drawing import draw_figures
-from fracctl.execution.executors import make_executor, n_workers
+from fracctl.execution.executors import executor_of, n_workers
 from fracctl.execution.poles import COLUMNS as POLE_COLUMNS
 from fracctl.execution.poles import Poles
 from fracctl.execution.progress import Progress
 from fracctl.execution.record import Record, run_log
 from fracctl.execution.row_store import RowStore, evaluations_schema
 from fracctl.execution.scheduler import Scheduler
+from fracctl.execution.solving_again import solve_again
 from fracctl.execution.summary import Tally, notes_on, plain_tables, results, summarise
 from fracctl.execution.tails import notes_on_tails
 from fracctl.execution.trajectories import trajectories
@@ -87,8 +89,9 @@ class Computation:
         """
         with self._ending_recorded():
             self._record.write("running")
-            with run_log(self._directory.log):
-                summary = self._compute()
+            executors = executor_of(self._scheduler, self._survey.n_points)
+            with run_log(self._directory.log), executors as executor:
+                summary = self._compute(executor)
             self._record.write(summary["status"], summary, summary["error"])
             self._directory.write_manifest()
         if summary["status"] == "finished":
@@ -108,20 +111,24 @@ class Computation:
                     self._record.write("failed", error=describe(problem))
             raise
 
-    def _compute(self) -> dict[str, Any]:
-        store = self._evaluate()
-        tally, optima, check = self._tables(store)
+    def _compute(self, executor: Executor) -> dict[str, Any]:
+        """Evaluate and conclude; workers check rows by another solver while this process writes and draws."""
+        store = self._evaluate(executor)
+        work, seed = self._job.work, int(self._job.configuration["seed"])
+        check = CrossCheck(self._evaluation, seed, lambda rows: executor.submit(solve_again, work, rows))
+        tally, optima = self._tables(store, check)
         poles = self._write_optima(optima)
         conclusion = self._conclude(check)
         self._trajectories()
         found = results(self._evaluation, optima)
+        tails = notes_on_tails(self._evaluation, found)
+        undrawn = draw_figures(self._directory, self._job.configuration["figures"])
+        check.finish()
+        self._record.foreign_cpu_time_s += check.foreign_cpu_time_s
         notes = self._notes + notes_on(found, self._survey.baseline, tally)
         if store.damaged:
             notes.append(f"stored parts that could not be trusted and were computed again: {store.damaged}")
-        notes += notes_on_tails(self._evaluation, found)
-        notes += check.notes()
-        notes += conclusion.notes
-        notes += draw_figures(self._directory, self._job.configuration["figures"])
+        notes += [*tails, *check.notes(), *conclusion.notes, *undrawn]
         identity = {
             "experiment": str(self._job.configuration["name"]),
             "run_id": self._directory.path.name,
@@ -130,9 +137,8 @@ class Computation:
         tables = {"tables": plain_tables(conclusion.shown)} if conclusion.shown else {}
         return summarise(identity, store, found, notes) | tables | check.summary() | poles.summary()
 
-    def _evaluate(self) -> RowStore:
+    def _evaluate(self, executor: Executor) -> RowStore:
         store = RowStore(self._directory, self._evaluation, self._evaluations_schema)
-        executor = make_executor(self._scheduler, self._survey.n_points)
         in_flight = 2 * self._workers if self._workers > 1 else 1
         scheduler = Scheduler(self._survey, executor, self._job.work, store, in_flight, self._progress.advance)
         versions = self._record.provenance["versions"]
@@ -148,23 +154,22 @@ class Computation:
             raise RunError(f"every point failed: {next(iter(store.failures.values()), 'there is none')}")
         return store
 
-    def _tables(self, store: RowStore) -> tuple[Tally, list[dict[str, Any]], CrossCheck]:
-        """Join the parts, select the optima, check a share of the rows and the optima by another solver."""
+    def _tables(self, store: RowStore, check: CrossCheck) -> tuple[Tally, list[dict[str, Any]]]:
+        """Join the parts, select the optima, begin to check a share of the rows and the optima."""
         evaluation = self._evaluation
-        table = self._evaluations_schema
-        self._directory.write_evaluations(table, store.tables())
+        self._directory.write_evaluations(self._evaluations_schema, store.tables())
         tally = Tally()
         selection = Optima(
             evaluation.objectives, evaluation.design_variables, self._survey.slices, self._survey.baseline
         )
-        check = CrossCheck(evaluation, int(self._job.configuration["seed"]))
         for rows in self._directory.stream_evaluations():
             tally.add(rows)
             selection.add(rows)
             check.add(rows)
         optima = selection.rows()
         check.add_optima(optima)
-        return tally, optima, check
+        check.begin()
+        return tally, optima
 
     def _write_optima(self, optima: list[dict[str, Any]]) -> Poles:
         """Complete the optima by their poles, and write both."""
@@ -177,9 +182,10 @@ class Computation:
         return poles
 
     def _conclude(self, check: CrossCheck) -> Conclusion:
-        """Store what the evaluation makes of all rows, and check its best points by another solver."""
+        """Store what the evaluation makes of all rows, and begin to check its best points."""
         conclusion = self._evaluation.conclude(self._directory.stream_evaluations())
         check.add_optima(conclusion.best)
+        check.begin()
         for name, records in conclusion.tables.items():
             counts = [column for column, value in records[0].items() if type(value) is int]
             self._directory.write_table(name, schema(tuple(records[0]), counts, self._metadata), records)

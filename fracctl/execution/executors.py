@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Executor, Future
+from contextlib import contextmanager
 from typing import Any, ParamSpec, TypeVar
 
 from fracctl.execution.processes import ProcessExecutor
@@ -44,3 +45,15 @@ def make_executor(scheduler: Mapping[str, Any], n_points: int | None) -> Executo
     if scheduler["type"] == "serial" or n_points == 1:
         return InProcessExecutor()
     return ProcessExecutor(n_workers(scheduler, n_points), SINGLE_THREAD)
+
+
+@contextmanager
+def executor_of(scheduler: Mapping[str, Any], n_points: int | None) -> Iterator[Executor]:
+    """Make an executor and shut it down at the end: at once, in the middle of its calls, where that is an exception."""
+    executor = make_executor(scheduler, n_points)
+    try:
+        yield executor
+    except BaseException:
+        executor.shutdown(cancel_futures=True)
+        raise
+    executor.shutdown()

@@ -40,7 +40,7 @@ class Scheduler:
 
     Args:
         survey: what is asked and told.
-        executor: where blocks run; it is shut down at the end.
+        executor: where blocks run; it is shut down at Ctrl-C.
         work: the evaluation.
         store: keeps the rows of finished blocks, and answers for those it has.
         in_flight: how many blocks are submitted at a time.
@@ -74,13 +74,9 @@ class Scheduler:
                 self._submit()
                 self._collect()
         except KeyboardInterrupt:
-            self._abandon()
+            self._executor.shutdown(cancel_futures=True)
             self._keep_what_is_done()
             raise
-        except BaseException:
-            self._abandon()
-            raise
-        self._executor.shutdown()
 
     def _submit(self) -> None:
         while len(self._pending) < self._in_flight:
@@ -133,9 +129,6 @@ class Scheduler:
     def _tell(self, block: Block, rows: Rows) -> None:
         self._survey.tell(block.number, rows)
         self._advance(block.size)
-
-    def _abandon(self) -> None:
-        self._executor.shutdown(cancel_futures=True)
 
     def _keep_what_is_done(self) -> None:
         for future, block in self._pending.items():

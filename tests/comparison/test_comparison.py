@@ -196,7 +196,7 @@ def test_the_summary(undisturbed: RunResult) -> None:
 
 
 def test_a_disagreement_of_the_solvers_fails_the_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("fracctl.execution.cross_check._difference", lambda first, second: np.ones(len(first.status)))
+    monkeypatch.setattr("fracctl.execution.solving_again._difference", lambda first, second: np.ones(len(first.status)))
     result = run(tmp_path, "scheduler=serial", "figures=null")
     assert result.summary["status"] == "failed"
     assert "do not agree" in result.summary["error"]
