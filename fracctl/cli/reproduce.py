@@ -15,6 +15,7 @@ from fracctl.cli.table import table
 from fracctl.errors import ConfigurationError, RunError, UsageError, suggestion
 
 if TYPE_CHECKING:
+    from fracctl.execution.executors import Executors
     from fracctl.reproduction.section import Reproduction
     from fracctl.reproduction.suites import Suite
 
@@ -46,8 +47,11 @@ def parser() -> Parser:
 
 def execute(options: argparse.Namespace) -> int:
     """Do what the command line asks for and return the exit code."""
+    from fracctl.execution.executors import Executors
+
     chosen = select(options.names)
-    codes = [_section(suite, section, options) for suite, section in chosen]
+    with Executors() as executors:
+        codes = [_section(suite, section, options, executors) for suite, section in chosen]
     return max(codes)
 
 
@@ -88,7 +92,7 @@ def _list(what: str, names: Iterable[str]) -> str:
     return f"; {what}: {', '.join(names)}"
 
 
-def _section(suite: Suite, section: str, options: argparse.Namespace) -> int:
+def _section(suite: Suite, section: str, options: argparse.Namespace, executors: Executors) -> int:
     """Reproduce one section, show it, and return its exit code."""
     from fracctl.cli.progress import display
     from fracctl.reproduction.section import reproduce
@@ -96,7 +100,12 @@ def _section(suite: Suite, section: str, options: argparse.Namespace) -> int:
 
     name = f"{suite.name}/{section}"
     try:
-        result = reproduce(suite, section, progress=lambda label: display(f"{name} ({label})", options.quiet))
+        result = reproduce(
+            suite,
+            section,
+            progress=lambda label: display(f"{name} ({label})", options.quiet),
+            executors=executors,
+        )
         write(result)
     except Exception as error:  # noqa: BLE001 - the other sections go on
         if options.json:

@@ -18,6 +18,7 @@ from fracctl.errors import ConfigurationError, FracctlError
 
 if TYPE_CHECKING:
     from fracctl.config.schemas import RunConfig
+    from fracctl.execution.executors import Executors
 
 SUMMARY = "compute an experiment, or a run composed from options; store it and draw its figures"
 
@@ -80,13 +81,16 @@ def execute(options: argparse.Namespace) -> int:
 
         output.say("---\n".join(to_yaml(job.config) for job in jobs).rstrip())
         return 0
+    from fracctl.execution.executors import Executors
+
     failures: list[tuple[_Job, Exception]] = []
-    for job in jobs:
-        problem = _run(job, options)
-        if problem is not None:
-            failures.append((job, problem))
-            if options.fail_fast:
-                break
+    with Executors() as executors:
+        for job in jobs:
+            problem = _run(job, options, executors)
+            if problem is not None:
+                failures.append((job, problem))
+                if options.fail_fast:
+                    break
     return _report(failures, options, several=len(jobs) > 1)
 
 
@@ -125,14 +129,14 @@ def _merged(problems: Sequence[tuple[str, str]], n_jobs: int) -> list[str]:
     return shared + [label + text for label, text in problems if text not in shared]
 
 
-def _run(job: _Job, options: argparse.Namespace) -> Exception | None:
+def _run(job: _Job, options: argparse.Namespace, executors: Executors) -> Exception | None:
     """Compute one run and show it; return what went wrong."""
     from fracctl.cli.progress import display
     from fracctl.execution.run import execute as execute_run
 
     try:
         progress = display(job.label.removesuffix(": ") or job.config.name, options.quiet)
-        summary = execute_run(job.config, fresh=options.fresh, progress=progress).summary
+        summary = execute_run(job.config, fresh=options.fresh, progress=progress, executors=executors).summary
     except Exception as error:  # noqa: BLE001 - the other runs go on
         if options.json:
             output.say(_json(_failure(job.config, error)))

@@ -16,7 +16,7 @@ from fracctl.errors import RunError
 from fracctl.evaluation import COUNTERS, Conclusion
 from fracctl.execution.cross_check import CrossCheck
 from fracctl.execution.drawing import draw_figures
-from fracctl.execution.executors import executor_of, n_workers
+from fracctl.execution.executors import Executors, n_workers
 from fracctl.execution.poles import COLUMNS as POLE_COLUMNS
 from fracctl.execution.poles import Poles
 from fracctl.execution.progress import Progress
@@ -61,10 +61,14 @@ class Computation:
         directory: where; what it holds already is not computed again.
         progress: is told.
         notes: sentences for the summary.
+        executors: lend what computes it.
     """
 
-    def __init__(self, job: Job, directory: RunDirectory, progress: Progress, notes: list[str]) -> None:
+    def __init__(
+        self, job: Job, directory: RunDirectory, progress: Progress, notes: list[str], executors: Executors
+    ) -> None:
         self._job, self._directory, self._progress, self._notes = job, directory, progress, notes
+        self._executors = executors
         self._evaluation = job.work.evaluation()
         self._survey = job.survey()
         self._scheduler = job.configuration["scheduler"]
@@ -89,8 +93,8 @@ class Computation:
         """
         with self._ending_recorded():
             self._record.write("running")
-            executors = executor_of(self._scheduler, self._survey.n_points)
-            with run_log(self._directory.log), executors as executor:
+            lent = self._executors.lent(self._scheduler, self._survey.n_points)
+            with run_log(self._directory.log), lent as executor:
                 summary = self._compute(executor)
             self._record.write(summary["status"], summary, summary["error"])
             self._directory.write_manifest()

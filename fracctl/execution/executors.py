@@ -10,6 +10,7 @@ from typing import Any, ParamSpec, TypeVar
 
 from fracctl.execution.processes import ProcessExecutor
 from fracctl.execution.threads import SINGLE_THREAD
+from fracctl.store.identity import canonical_json
 
 _P = ParamSpec("_P")
 _T = TypeVar("_T")
@@ -47,13 +48,34 @@ def make_executor(scheduler: Mapping[str, Any], n_points: int | None) -> Executo
     return ProcessExecutor(n_workers(scheduler, n_points), SINGLE_THREAD)
 
 
-@contextmanager
-def executor_of(scheduler: Mapping[str, Any], n_points: int | None) -> Iterator[Executor]:
-    """Make an executor and shut it down at the end: at once, in the middle of its calls, where that is an exception."""
-    executor = make_executor(scheduler, n_points)
-    try:
-        yield executor
-    except BaseException:
-        executor.shutdown(cancel_futures=True)
-        raise
-    executor.shutdown()
+class Executors:
+    """The executors of runs that follow each other: worker processes stay for the next run on as many.
+
+    A context manager; with it they end.
+    """
+
+    def __init__(self) -> None:
+        self._idle: dict[tuple[bool, str], Executor] = {}
+
+    def __enter__(self) -> Executors:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for executor in self._idle.values():
+            executor.shutdown()
+        self._idle.clear()
+
+    @contextmanager
+    def lent(self, scheduler: Mapping[str, Any], n_points: int | None) -> Iterator[Executor]:
+        """Lend the executor of the configuration's `scheduler` for a run.
+
+        An exception in the meantime shuts it down at once, in the middle of its calls.
+        """
+        key = n_points == 1, canonical_json(scheduler)
+        executor = self._idle.pop(key, None) or make_executor(scheduler, n_points)
+        try:
+            yield executor
+        except BaseException:
+            executor.shutdown(cancel_futures=True)
+            raise
+        self._idle[key] = executor

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -9,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from fracctl.execution.computation import Computation, Job
 from fracctl.execution.drawing import draw_figures
+from fracctl.execution.executors import Executors
 from fracctl.execution.progress import NoProgress, Progress
 from fracctl.execution.threads import single_threaded
 from fracctl.store import RunDirectory
@@ -45,13 +47,16 @@ class RunResult:
         return RunDirectory(self.run_directory).optima()
 
 
-def perform(job: Job, *, fresh: bool = False, progress: Progress | None = None) -> RunResult:
+def perform(
+    job: Job, *, fresh: bool = False, progress: Progress | None = None, executors: Executors | None = None
+) -> RunResult:
     """Compute a job, or return it where it is stored already; continue it where it is unfinished.
 
     Args:
         job: what to compute.
         fresh: compute again what is stored.
         progress: is told how far the run is.
+        executors: lend worker processes to several runs; None for its own.
 
     Raises:
         RunError: it could not be computed or stored, or another process is computing it.
@@ -64,7 +69,8 @@ def perform(job: Job, *, fresh: bool = False, progress: Progress | None = None) 
     with exclusive(directory.lock), single_threaded():
         if fresh or not _is_whole(directory):
             notes = _prepare(directory, fresh)
-            Computation(job, directory, progress or NoProgress(), notes).run()
+            with nullcontext(executors) if executors else Executors() as lenders:
+                Computation(job, directory, progress or NoProgress(), notes, lenders).run()
             return RunResult(directory.path, directory.run_json["summary"])
         return _redrawn(directory, job)
 

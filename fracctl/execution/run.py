@@ -5,6 +5,7 @@ from __future__ import annotations
 from fracctl.config.build import build_evaluation, build_survey
 from fracctl.config.schemas import RunConfig
 from fracctl.execution.computation import Job
+from fracctl.execution.executors import Executors
 from fracctl.execution.perform import RunResult, perform
 from fracctl.execution.progress import Progress
 from fracctl.execution.worker import Work
@@ -12,13 +13,16 @@ from fracctl.execution.worker import Work
 __all__ = ["RunResult", "execute"]
 
 
-def execute(config: RunConfig, *, fresh: bool = False, progress: Progress | None = None) -> RunResult:
+def execute(
+    config: RunConfig, *, fresh: bool = False, progress: Progress | None = None, executors: Executors | None = None
+) -> RunResult:
     """Compute a run, or return it where it is stored already; continue it where it is unfinished.
 
     Args:
         config: what to compute and where to store it.
         fresh: compute again what is stored.
         progress: is told how far the run is.
+        executors: lend worker processes to several runs; None for its own.
 
     Raises:
         RunError: it could not be computed or stored, or another process is computing it.
@@ -27,4 +31,4 @@ def execute(config: RunConfig, *, fresh: bool = False, progress: Progress | None
     plain = config.model_dump(mode="json")
     work = Work.of("fracctl.execution.configured:evaluation_of", plain)
     job = Job(plain, work, lambda: build_survey(config, build_evaluation(config)))
-    return perform(job, fresh=fresh, progress=progress)
+    return perform(job, fresh=fresh, progress=progress, executors=executors)

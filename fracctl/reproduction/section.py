@@ -10,6 +10,7 @@ from pathlib import Path
 
 from fracctl.config.compose import compose
 from fracctl.errors import RunError
+from fracctl.execution.executors import Executors
 from fracctl.execution.progress import Progress
 from fracctl.execution.run import RunResult, execute
 from fracctl.reproduction.published import REPRODUCED, UNITS, WORDS, PublishedRow
@@ -79,6 +80,7 @@ def reproduce(
     section: str,
     overrides: Sequence[str] = (),
     progress: Callable[[str], Progress] | None = None,
+    executors: Executors | None = None,
 ) -> Reproduction:
     """Run the experiments of a section, with the paper's sampling and exact, and compare with what is published.
 
@@ -89,6 +91,7 @@ def reproduce(
         section: its name.
         overrides: of both runs, e.g. a coarser grid.
         progress: makes a progress display from a label.
+        executors: lend worker processes to all runs; None for each its own.
 
     Raises:
         ConfigurationError: an experiment does not exist or an override is wrong.
@@ -100,15 +103,17 @@ def reproduce(
     for sampling, words in settings.items():
         for name in wanted.experiments:
             display = progress(f"{name}, {sampling}") if progress else None
-            runs[sampling][name] = _run(name, [*words, *overrides], display)
+            runs[sampling][name] = _run(name, [*words, *overrides], display, executors)
     sampled, exact = (_optima(wanted, runs[sampling]) for sampling in SAMPLINGS)
     rows = tuple(_row(published, recipe, sampled, exact) for published, recipe in suite.rows(section))
     output = runs[EXACT][wanted.experiment].run_directory.parents[1]
     return Reproduction(suite.name, section, wanted.title, rows, runs, output / "reproduce" / suite.name / section)
 
 
-def _run(experiment: str, overrides: Sequence[str], progress: Progress | None) -> RunResult:
-    result = execute(compose([f"experiment={experiment}", *overrides]), progress=progress)
+def _run(
+    experiment: str, overrides: Sequence[str], progress: Progress | None, executors: Executors | None
+) -> RunResult:
+    result = execute(compose([f"experiment={experiment}", *overrides]), progress=progress, executors=executors)
     if error := result.summary.get("error"):
         raise RunError(f"{experiment}: {error}")
     return result

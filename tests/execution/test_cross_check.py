@@ -16,7 +16,7 @@ from fracctl.controllers import PDAlpha
 from fracctl.errors import FracctlError
 from fracctl.evaluation import Evaluation
 from fracctl.execution.cross_check import CrossCheck
-from fracctl.execution.executors import InProcessExecutor, executor_of
+from fracctl.execution.executors import Executors, InProcessExecutor
 from fracctl.execution.solving_again import solve_again
 from fracctl.execution.worker import Work
 from fracctl.plants import LinearPlant
@@ -58,7 +58,7 @@ def checked_by(scheduler: Mapping[str, Any], **data: Any) -> CrossCheck:
     """A cross-check of all rows of some orders by a scheduler."""
     work = Work.of("tests.execution.checked_evaluation:evaluation", {"share": 1.0, **data})
     of = work.evaluation()
-    with executor_of(scheduler, n_points=None) as executor:
+    with Executors() as executors, executors.lent(scheduler, n_points=None) as executor:
         check = CrossCheck(of, 1, lambda piece: executor.submit(solve_again, work, piece))
         check.add(rows(of, alpha=np.tile([0.8, 0.85, 0.9, 0.95], 50)))
         check.begin()

@@ -16,7 +16,7 @@ import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from fracctl.errors import RunError
-from fracctl.execution.executors import make_executor
+from fracctl.execution.executors import Executors, make_executor
 from fracctl.execution.perform import perform
 from fracctl.execution.processes import ProcessExecutor, WorkerError, WorkerLost
 from fracctl.execution.threads import single_threaded
@@ -131,6 +131,35 @@ def test_an_executor_that_is_shut_down_kills_what_runs() -> None:
     executor.shutdown(cancel_futures=True)
     assert time.monotonic() - started < 1.0
     assert all(future.done() for future in futures)
+
+
+def test_runs_share_their_workers(tmp_path: Path, undisturbed: Path) -> None:
+    with Executors() as executors:
+        for seed in (0, 1):
+            found = perform(job(tmp_path, LOCAL, seed=seed), executors=executors)
+            assert tables_of(found.run_directory) == tables_of(undisturbed)
+            workers = children()
+            assert len(workers) == 2
+            with executors.lent(LOCAL, n_points=None) as executor:
+                assert isinstance(executor, ProcessExecutor)
+                assert set(executor.processes()) == workers
+
+
+def test_a_run_that_fails_takes_its_workers_with_it(tmp_path: Path, undisturbed: Path) -> None:
+    with Executors() as executors:
+        with pytest.raises(KeyboardInterrupt):
+            perform(job(tmp_path, LOCAL), progress=Watch(interrupt_after=1), executors=executors)
+        until(lambda: not children())
+        found = perform(job(tmp_path, LOCAL), executors=executors)
+    assert tables_of(found.run_directory) == tables_of(undisturbed)
+
+
+def test_a_worker_that_dies_between_runs_is_replaced(tmp_path: Path, undisturbed: Path) -> None:
+    with Executors() as executors:
+        perform(job(tmp_path, LOCAL, seed=1), executors=executors)
+        os.kill(min(children()), signal.SIGKILL)
+        found = perform(job(tmp_path, LOCAL), executors=executors)
+    assert tables_of(found.run_directory) == tables_of(undisturbed)
 
 
 # What follows runs in processes of its own.
