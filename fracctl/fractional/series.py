@@ -6,7 +6,6 @@ each coefficient feeds those at e + ℓ_i - β, ℓ_i the highest order of coord
 
 from __future__ import annotations
 
-from collections import Counter
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
@@ -20,8 +19,8 @@ from fracctl.fractional.system import LinearFractionalSystem
 
 _MOST_LEVELS = 60
 """Steps of the recursion after which the powers of a solution count as too dense."""
-_Key = tuple[int, tuple[tuple[int, int], ...]]
-"""Start (0 for y(0), 1 for y'(0)) and how often each (term, column-row shift class) occurs."""
+_Key = tuple[int, tuple[int, ...]]
+"""Start (0 for y(0), 1 for y'(0)) and how often each symbol occurs."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +67,7 @@ def differentiated(exponents: Floats, order: Floats, times: Floats) -> Floats:
 def _killed(key: _Key, order: Floats) -> bool:
     """Whether the Caputo derivative takes the power to zero: y(0) for order > 0, y'(0) t for order > 1."""
     start, counts = key
-    return not counts and bool(np.min(order) > start)
+    return not any(counts) and bool(np.min(order) > start)
 
 
 def short_time_series(system: LinearFractionalSystem, y0: Floats, y0_rate: Floats, highest: float) -> PowerSeries:
@@ -161,7 +160,7 @@ def _recipe(symbols: list[_Symbol], present: list[set[int]], highest: float) -> 
     `present` tells which components of y(0) and of y'(0) are not zero.
     """
     places = [(number, place) for number, symbol in enumerate(symbols) for place in symbol.entries]
-    keys: list[_Key] = [(0, ()), (1, ())]
+    keys: list[_Key] = [(start, (0,) * len(symbols)) for start in (0, 1)]
     index = {key: i for i, key in enumerate(keys)}
     exponents = [_exponent(key, symbols) for key in keys]
     present = list(present)
@@ -170,11 +169,11 @@ def _recipe(symbols: list[_Symbol], present: list[set[int]], highest: float) -> 
     for _ in range(_MOST_LEVELS):
         following: list[_Key] = []
         for key in level:
-            e = exponents[index[key]]
-            if np.min(e) > highest:
+            source = index[key]
+            if np.min(exponents[source]) > highest:
                 continue
             for entry, (number, (row, column)) in enumerate(places):
-                if column not in present[index[key]] or _killed(key, symbols[number].order):
+                if column not in present[source] or _killed(key, symbols[number].order):
                     continue
                 new = _extended(key, number)
                 if new not in index:
@@ -183,7 +182,7 @@ def _recipe(symbols: list[_Symbol], present: list[set[int]], highest: float) -> 
                     present.append(set())
                     following.append(new)
                 present[index[new]].add(row)
-                steps.append((index[new], index[key], row, column, entry))
+                steps.append((index[new], source, row, column, entry))
         level = following
         if not level:
             table = np.stack(np.broadcast_arrays(*exponents))
@@ -233,13 +232,12 @@ def _symbols(system: LinearFractionalSystem) -> list[_Symbol]:
 def _exponent(key: _Key, symbols: list[_Symbol]) -> Floats:
     start, counts = key
     total = np.asarray(float(start))
-    for number, count in counts:
-        shift = symbols[number].shift
-        total = total + count * shift
+    for count, symbol in zip(counts, symbols, strict=True):
+        if count:
+            total = total + count * symbol.shift
     return total
 
 
 def _extended(key: _Key, symbol: int) -> _Key:
-    counts = Counter(dict(key[1]))
-    counts[symbol] += 1
-    return key[0], tuple(sorted(counts.items()))
+    start, counts = key
+    return start, (*counts[:symbol], counts[symbol] + 1, *counts[symbol + 1 :])
