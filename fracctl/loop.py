@@ -11,6 +11,7 @@ import numpy as np
 from fracctl.arrays import Floats, batch_size
 from fracctl.controllers.delayed_feedback import DelayedLaw, DelayedTerm
 from fracctl.controllers.linear import LinearLaw, LinearLawTerms, ModelBasedLaw
+from fracctl.controllers.saturation import Saturation
 from fracctl.errors import ArgumentError, UnsupportedError
 from fracctl.fractional.system import LinearFractionalSystem
 from fracctl.fractional.terms import FractionalTerm
@@ -24,6 +25,7 @@ class Need(StrEnum):
     FRACTIONAL_TERMS = "fractional terms"
     NONLINEAR_PLANT = "a nonlinear plant"
     DELAYS = "delayed states"
+    SATURATION = "a saturated control"
 
 
 @dataclass(frozen=True)
@@ -33,6 +35,7 @@ class ClosedLoop:
     Args:
         plant: what is controlled, e.g. `fracctl.plants.HCWOutOfPlane()`.
         controller: the law, e.g. `fracctl.controllers.PDAlpha(k_p=0.85, k_d=2.0, alpha=0.91)`; None for free motion.
+        saturation: what the thrusters can give; None for no limit.
 
     Raises:
         ArgumentError: the shapes of the law's gains do not fit the plant.
@@ -41,8 +44,11 @@ class ClosedLoop:
 
     plant: LinearPlant | StatePlant
     controller: LinearLaw | ModelBasedLaw | DelayedLaw | None = None
+    saturation: Saturation | None = None
 
     def __post_init__(self) -> None:
+        if self.saturation is not None:
+            self.saturation.check(self.plant.n_controls)
         self.batch  # noqa: B018 - a wrong shape is refused here, where the user sees which loop it is
 
     @property
@@ -55,6 +61,8 @@ class ClosedLoop:
             needs.add(Need.DELAYS)
         elif self.controller is not None:
             needs.add(Need.FRACTIONAL_TERMS)
+        if self.saturation is not None:
+            needs.add(Need.SATURATION)
         return frozenset(needs)
 
     @cached_property
@@ -96,7 +104,8 @@ class ClosedLoop:
     def batch(self) -> int | None:
         """Batch size b, None for a single loop."""
         if self.delayed_terms:
-            sizes = {term.batch for term in self.delayed_terms} - {None}
+            limited = None if self.saturation is None else self.saturation.batch
+            sizes = {limited, *(term.batch for term in self.delayed_terms)} - {None}
             if len(sizes - {1}) > 1:
                 raise ArgumentError(
                     "controller", f"a sum of batches of {sorted(map(str, sizes))}", "must have one size"

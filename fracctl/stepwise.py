@@ -12,7 +12,9 @@ from numpy.typing import ArrayLike
 from fracctl.arrays import Array, Floats, finite
 from fracctl.compiling import compiled
 from fracctl.controllers.delayed_feedback import DelayedTerm, History
-from fracctl.errors import ArgumentError
+from fracctl.controllers.saturation import Saturation
+from fracctl.errors import ArgumentError, UnsupportedError
+from fracctl.plants.state import StatePlant
 
 
 @dataclass(frozen=True)
@@ -24,6 +26,8 @@ class Steps:
     coefficients: Floats
     """Of the polynomials of `solvers.dop853.basis` in the share of the step that has passed, (S, 8, b, n)."""
     history: History | None
+    delay: Steps | None = None
+    """τ of members whose delay adapts, with one component."""
 
     def __call__(self, times: Floats) -> Floats:
         """Return the states at times (b, k), (b, k, n); outside the steps the nearest polynomial is continued."""
@@ -36,6 +40,8 @@ class Steps:
 
     def reference(self, term: DelayedTerm, times: Floats) -> Floats:
         """Return W(t) = (1 - R) x(t - τ) + R W(t - τ) at times (b, k), (b, k, n); W = x where x(t - τ) is unknown."""
+        if self.delay is not None:
+            return self(times - self.delay(times)[..., 0])
         delay, recall = term.delay[:, None], term.recall[:, None]
         first = 0.0 if self.history is not None else delay
         total: Floats = np.zeros((*times.shape, self.coefficients.shape[-1]))
@@ -58,10 +64,12 @@ class StepwiseTrajectory:
     states and controls are NaN.
     """
 
+    plant: StatePlant
     steps: Steps
     terms: tuple[DelayedTerm, ...]
     """Of the control, with batch axes."""
-    n_controls: int
+    saturation: Saturation | None
+    """What the thrusters can give."""
     horizon: float
     end: Floats
     """When each member ended: the horizon, a terminal event, or where it stopped being finite, (b,)."""
@@ -99,8 +107,7 @@ class StepwiseTrajectory:
         Raises:
             ArgumentError: a time lies outside [0, horizon].
         """
-        t = self._checked(times)
-        return self._shown(t, self.steps(t))
+        return self._shown(times, self.steps(self._checked(times)))
 
     def control(self, times: ArrayLike) -> Floats:
         """Return the controls at times as in a call, (b, t, m), or (t, m); at a jump what follows it.
@@ -108,16 +115,41 @@ class StepwiseTrajectory:
         Raises:
             ArgumentError: a time lies outside [0, horizon].
         """
+        demand = self._demand(self._checked(times))
+        return self._shown(times, demand if self.saturation is None else self.saturation(demand))
+
+    def delay(self, times: ArrayLike) -> Floats:
+        """Return the delay of the first term at times as in a call, (b, t), or (t,) for a single loop.
+
+        Raises:
+            UnsupportedError: the motion is free.
+            ArgumentError: a time lies outside [0, horizon].
+        """
+        if not self.terms:
+            raise UnsupportedError("a free motion has no delay")
         t = self._checked(times)
-        total = np.zeros((*t.shape, self.n_controls))
+        constant = np.array(np.broadcast_to(self.terms[0].delay[:, None], t.shape))
+        return self._shown(times, constant if self.steps.delay is None else self.steps.delay(t)[..., 0])
+
+    def demand(self, times: ArrayLike) -> Floats:
+        """Return what the control would be without saturation, as `control` returns the control.
+
+        Raises:
+            ArgumentError: a time lies outside [0, horizon].
+        """
+        return self._shown(times, self._demand(self._checked(times)))
+
+    def _demand(self, t: Floats) -> Floats:
+        total = np.zeros((*t.shape, self.plant.n_controls))
         states = self.steps(t)
         for term in self.terms:
             difference = states - self.steps.reference(term, t)
             active = t >= term.switch_on[:, None]
-            total -= np.where(active[..., None], np.einsum("bmn,btn->btm", term.gain, difference), 0.0)
-        return self._shown(t, total)
+            total -= np.where(active[..., None], np.einsum("btmn,btn->btm", term.gains(t), difference), 0.0)
+        return total
 
-    def _shown(self, t: Floats, values: Floats) -> Floats:
+    def _shown(self, times: ArrayLike, values: Floats) -> Floats:
+        t = self._checked(times)
         values[t > self.end[:, None]] = np.nan
         return values if self.batched else values[0]
 

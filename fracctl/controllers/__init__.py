@@ -1,5 +1,6 @@
 """Control laws."""
 
+from fracctl.controllers.adaptive_delay import AdaptiveDelayedFeedback
 from fracctl.controllers.delayed_feedback import DelayedFeedback, DelayedLaw, DelayedSum, DelayedTerm
 from fracctl.controllers.linear import LinearLaw, LinearLawTerms
 from fracctl.controllers.parameters import Parameter
@@ -9,10 +10,12 @@ from fracctl.controllers.pd_lag import PDLag
 from fracctl.controllers.pdd_alpha import PDDAlpha
 from fracctl.controllers.pi_lambda_d_mu import PILambdaDMu
 from fracctl.controllers.pid import PID
+from fracctl.controllers.saturation import Saturation
 
 __all__ = [
     "PD",
     "PID",
+    "AdaptiveDelayedFeedback",
     "DelayedFeedback",
     "DelayedLaw",
     "DelayedSum",
@@ -24,4 +27,5 @@ __all__ = [
     "PDLag",
     "PILambdaDMu",
     "Parameter",
+    "Saturation",
 ]

@@ -22,13 +22,16 @@ class Parameter:
     """Upper end of the range, itself allowed."""
     lower_allowed: bool = True
     """Whether the lower end itself is allowed."""
+    upper_allowed: bool = True
+    """Whether the upper end itself is allowed."""
     kind: Literal["gain", "order", "time", "weight"] = "gain"
     """What it is: surveys vary gains and orders in different ways."""
 
     def contains(self, value: float) -> bool:
         """Whether `value` lies in the range; False for NaN and infinities."""
         above = value >= self.lower if self.lower_allowed else value > self.lower
-        return math.isfinite(value) and above and value <= self.upper
+        below = value <= self.upper if self.upper_allowed else value < self.upper
+        return math.isfinite(value) and above and below
 
     @property
     def allowed(self) -> str:
@@ -36,7 +39,7 @@ class Parameter:
         if math.isinf(self.lower) and math.isinf(self.upper):
             return "must be a finite number"
         bracket = "[" if self.lower_allowed and math.isfinite(self.lower) else "("
-        close = "]" if math.isfinite(self.upper) else ")"
+        close = "]" if self.upper_allowed and math.isfinite(self.upper) else ")"
         return f"must lie in {bracket}{self.lower:g}, {self.upper:g}{close}"
 
 

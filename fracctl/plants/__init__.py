@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING, Any
 from fracctl.plants.function import FunctionPlant
 from fracctl.plants.hcw import HCW, Chief, HCWInPlane, HCWOutOfPlane
 from fracctl.plants.linear import LinearPlant
-from fracctl.plants.state import Event, StatePlant
+from fracctl.plants.state import Event, Section, StatePlant
 
 if TYPE_CHECKING:
     from fracctl.plants.libration import Libration
+    from fracctl.plants.perturbed_relative_motion import PerturbedRelativeMotion
     from fracctl.plants.relative_motion import RelativeMotion
     from fracctl.plants.rotating_ellipsoid import RotatingEllipsoid
 
@@ -27,13 +28,16 @@ __all__ = [
     "HCWOutOfPlane",
     "Libration",
     "LinearPlant",
+    "PerturbedRelativeMotion",
     "RelativeMotion",
     "RotatingEllipsoid",
+    "Section",
     "StatePlant",
 ]
 
 _COMPILED = {
     "Libration": "libration",
+    "PerturbedRelativeMotion": "perturbed_relative_motion",
     "RelativeMotion": "relative_motion",
     "RotatingEllipsoid": "rotating_ellipsoid",
 }

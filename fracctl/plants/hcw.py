@@ -52,6 +52,7 @@ _DAMPING = np.array([[0.0, 2.0, 0.0], [-2.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
 
 class _HCWPart(LinearPlant):
     names: tuple[str, ...]
+    period = 2.0 * math.pi
 
     def __init__(self, chief: Chief | None = None) -> None:
         self.chief = chief or Chief()

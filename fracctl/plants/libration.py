@@ -30,7 +30,9 @@ class Libration(SecondOrder):
     """
 
     components = ("phi",)
+    angles = ("phi",)
     scales = None
+    period = 2.0 * math.pi
 
     def __init__(
         self, eccentricity: float = 0.2, inertia: float = 0.75, drag: float = 0.04, damping: float = 0.05

@@ -36,6 +36,7 @@ class RelativeMotion(SecondOrder):
     """
 
     components = ("x", "y", "z")
+    period = 2.0 * math.pi
 
     def __init__(self, leader: Chief | None = None, eccentricity: float = 0.0) -> None:
         if not 0.0 <= eccentricity < 1.0:

@@ -11,7 +11,7 @@ import numpy as np
 from fracctl.arrays import Floats
 from fracctl.compiling import compiled_with
 from fracctl.errors import ArgumentError
-from fracctl.plants.state import Event, SecondOrder
+from fracctl.plants.state import Event, SecondOrder, Section
 from fracctl.units import Scales
 
 EROS_GRAVITATIONAL_PARAMETER_KM3_S2 = 4.463e-4
@@ -87,6 +87,11 @@ class RotatingEllipsoid(SecondOrder):
             Event("escaped", lambda _, x: self.escape_radius - np.hypot(x[:, 0], x[:, 1])),
             Event("body_entry", lambda _, x: np.hypot(x[:, 0] / a, x[:, 1] / b) - 1.0, self.collision == "body"),
         )
+
+    @property
+    def section(self) -> Section:
+        """x = 0 with y > 0, where the paper's orbits begin."""
+        return Section(lambda _, x: x[:, 0], lambda _, x: x[:, 1])
 
     def rates(self, t: Floats, x: Floats, u: Floats) -> Floats:
         """Return x' of x = [x, y, x', y'], (b, 4)."""

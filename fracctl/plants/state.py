@@ -22,6 +22,16 @@ class Event:
     """Whether the run ends there."""
 
 
+@dataclass(frozen=True)
+class Section:
+    """A surface that orbits return to: where one function of time and state is zero and another positive."""
+
+    function: Callable[[Floats, Floats], Floats]
+    """g(t, x) of t (k,) and x (k, n), (k,), zero on the surface."""
+    side: Callable[[Floats, Floats], Floats]
+    """A function as g that is positive on the part of it that counts."""
+
+
 @runtime_checkable
 class StatePlant(Protocol):
     """A plant x' = f(t, x, u) with n states and m controls, for whole batches."""
@@ -62,6 +72,10 @@ class SecondOrder:
 
     components: tuple[str, ...]
     """Names of the m positions."""
+    angles: tuple[str, ...] = ()
+    """Names of positions that are angles in radians."""
+    period: float | None = None
+    """Of the plant's dependence on time or of its leader's orbit; None where there is none."""
 
     @property
     def n_states(self) -> int:

@@ -7,9 +7,10 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from fracctl.arrays import Floats
+from fracctl.arrays import Booleans, Floats
 from fracctl.compiling import compiled
-from fracctl.controllers.delayed_feedback import DelayedTerm, History
+from fracctl.controllers.delayed_feedback import DelayedTerm, GainFunction, History, Window
+from fracctl.controllers.saturation import Saturation
 from fracctl.plants.state import StatePlant
 from fracctl.solvers import dop853
 from fracctl.solvers.method_of_steps_mesh import Mesh
@@ -24,6 +25,7 @@ _CHECK = 64
 def run(
     plant: StatePlant,
     terms: Sequence[DelayedTerm],
+    saturation: Saturation | None,
     history: History | None,
     mesh: Mesh,
     start: Floats,
@@ -34,6 +36,7 @@ def run(
     Args:
         plant: the plant.
         terms: of the control, with batch axes.
+        saturation: of the control.
         history: states before time 0.
         mesh: of b members.
         start: x(0), (b, n).
@@ -42,12 +45,13 @@ def run(
     b, n = start.shape
     count = mesh.edges.shape[1] - 1
     steps = Steps(mesh.edges, np.full((count, dop853.ROWS, b, n), np.nan), history)
-    control = _on_the_grid(terms, mesh, steps) if mesh.back else _by_looking_up(terms, steps, plant.n_controls)
+    on_grid = mesh.back is not None
+    control = _on_the_grid(plant, terms, mesh, steps) if on_grid else _by_looking_up(terms, steps, plant.n_controls)
     x, widths = start, np.diff(mesh.edges, axis=1)
     for k in range(count):
         h = np.ascontiguousarray(widths[:, k])
         times = mesh.edges[:, k] + dop853.NODES[:, None] * h
-        values = _step(plant, times, h, x, control(k, times))
+        values = _step(plant, times, h, x, _limited(saturation, control(k, times)))
         steps.coefficients[k] = (dop853.DENSE @ values).reshape(dop853.ROWS, b, n)
         x = (dop853.COMBINE[dop853.END] @ values).reshape(b, n)
         if k % _CHECK == _CHECK - 1 and finished(steps, k + 1):
@@ -66,9 +70,24 @@ def _step(plant: StatePlant, times: Floats, h: Floats, x: Floats, control: Contr
     return values
 
 
-def _feedback(gain: Floats, reference: Floats) -> Control:
-    """Return -K (x - W) with K (b, m, n) and W (16, b, n)."""
-    return lambda s, x: _fed_back(gain, reference[s], x)
+def _limited(saturation: Saturation | None, demand: Control) -> Control:
+    return demand if saturation is None else lambda s, x: saturation(demand(s, x))
+
+
+def _inside(times: Floats) -> Floats:
+    """Return the times of the stages of a step (16, b), those at its ends on the inner side of jumps there."""
+    inset = 8e-15 * np.abs(times[dop853.END])
+    return np.clip(times, times[0] + inset, times[dop853.END] - inset)
+
+
+def _feedback(term: DelayedTerm, on: Booleans, times: Floats, reference: Floats) -> Control:
+    """Return -K (x - W) with W (16, b, n) at times (16, b), and nothing for members that are not on."""
+    if term.schedule is None:
+        gain = term.gain if on.all() else term.gain * on[:, None, None]
+        return lambda s, x: _fed_back(gain, reference[s], x)
+    gains = np.array(np.swapaxes(term.gains(_inside(times).T), 0, 1), order="C")
+    gains[:, ~on] = 0.0
+    return lambda s, x: _fed_back(gains[s], reference[s], x)
 
 
 @compiled
@@ -82,7 +101,48 @@ def _fed_back(gain: Floats, reference: Floats, x: Floats) -> Floats:
     return out
 
 
-def _on_the_grid(terms: Sequence[DelayedTerm], mesh: Mesh, steps: Steps) -> Callable[[int, Floats], Control]:
+class RenewedGain:
+    """The K(t) that a law has given for each delay of a run, (b, k, m, n) at times (b, k); 0 before the first.
+
+    Args:
+        term: of the control, with batch axes.
+    """
+
+    def __init__(self, term: DelayedTerm) -> None:
+        self._delay, self._shape = term.delay, term.gain.shape[-2:]
+        self._parts: dict[int, GainFunction] = {}
+
+    def renew(self, segment: int, gain: GainFunction) -> None:
+        """Take a K(t) for the times from `segment` delays on."""
+        self._parts[segment] = gain
+
+    def __call__(self, times: Floats) -> Floats:
+        """Return the gains at times (b, k)."""
+        out = np.zeros((*times.shape, *self._shape))
+        segments = np.floor(times / self._delay[:, None] * (1.0 + 4e-16)).astype(int)
+        for segment in set(np.unique(segments)) & self._parts.keys():
+            inside = segments == segment
+            columns = np.flatnonzero(inside.any(axis=0))
+            out[inside] = self._parts[segment](times[:, columns])[inside[:, columns]]
+        return out
+
+
+def _renewals(plant: StatePlant, term: DelayedTerm, on: Booleans, back: int, steps: Steps) -> Callable[[int], None]:
+    """Return what asks a law for its next K(t) where a delay has ended."""
+
+    def renew(k: int) -> None:
+        if term.on_segment is None or k % back or k < back or not on[k : k + back].any():
+            return
+        assert isinstance(term.schedule, RenewedGain)
+        start = np.ascontiguousarray(steps.edges[:, k - back])
+        term.schedule.renew(k // back, term.on_segment(Window(plant, start, term.delay, steps)))
+
+    return renew
+
+
+def _on_the_grid(
+    plant: StatePlant, terms: Sequence[DelayedTerm], mesh: Mesh, steps: Steps
+) -> Callable[[int, Floats], Control]:
     """The one delay is a whole number of steps: the reference is the polynomial so many steps back."""
     (term,), back = terms, mesh.back
     assert back is not None
@@ -91,10 +151,12 @@ def _on_the_grid(terms: Sequence[DelayedTerm], mesh: Mesh, steps: Steps) -> Call
     middles = 0.5 * (mesh.edges[:, 1:] + mesh.edges[:, :-1])
     on = (middles > term.switch_on[:, None]).T
     recall = term.recall[:, None]
+    renew = _renewals(plant, term, on, back, steps)
     free = np.zeros((b, term.gain.shape[1]))
     earlier: deque[Floats] = deque(_fitted(term, mesh.shares, steps.history, n), maxlen=back)
 
-    def control(k: int, _: Floats) -> Control:
+    def control(k: int, times: Floats) -> Control:
+        renew(k)
         if k < back and steps.history is None:
             return lambda s, x: free  # noqa: ARG005
         if k < back:
@@ -107,8 +169,8 @@ def _on_the_grid(terms: Sequence[DelayedTerm], mesh: Mesh, steps: Steps) -> Call
                 earlier.append(reference)
         if not on[k].any():
             return lambda s, x: free  # noqa: ARG005
-        gain = term.gain if on[k].all() else term.gain * on[k][:, None, None]
-        return _feedback(gain, (dop853.AT_STAGES @ reference.reshape(rows, -1)).reshape(-1, b, n))
+        delayed = (dop853.AT_STAGES @ reference.reshape(rows, -1)).reshape(-1, b, n)
+        return _feedback(term, on[k], times, delayed)
 
     return control
 
@@ -135,15 +197,14 @@ def _by_looking_up(terms: Sequence[DelayedTerm], steps: Steps, n_controls: int) 
 
     def control(k: int, times: Floats) -> Control:
         parts = []
-        inset = 1e-15 * np.abs(times[dop853.END]) * 8.0
-        inside = np.clip(times, times[0] + inset, times[dop853.END] - inset).T
+        inside = _inside(times).T
         for term in terms:
             known = middles[:, k] > (0.0 if steps.history is not None else term.delay)
             on = known & (middles[:, k] > term.switch_on)
             if on.any():
                 reference = np.ascontiguousarray(np.swapaxes(steps.reference(term, inside), 0, 1))
                 reference[:, ~on] = 0.0
-                parts.append(_feedback(term.gain * on[:, None, None], reference))
+                parts.append(_feedback(term, on, times, reference))
         return lambda s, x: sum((part(s, x) for part in parts), free)
 
     return control

@@ -6,6 +6,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from fracctl.controllers import DelayedFeedback, DelayedSum, PDAlpha
 from fracctl.errors import ArgumentError, UnsupportedError
@@ -23,6 +24,7 @@ from fracctl.solvers import Contour, MethodOfSteps, solve
 from fracctl.solvers.dop853 import COMBINE, NODES, basis
 from tests.references import delays
 
+TURN = 2.0 * np.pi
 ONE = Fraction(1)
 TENTH = Fraction(1, 10)
 STIFFNESS, DAMPING = -1.7, -0.2
@@ -179,6 +181,45 @@ def test_members_with_their_own_delays_gains_and_states() -> None:
         np.testing.assert_array_equal(single.control(t[t < begin[i]]), 0.0)
         own = np.linspace(0.0, 9.0, 4)[:, None] * np.ones(3)
         np.testing.assert_array_equal(whole(own)[i], whole(own[i])[i])
+
+
+def test_a_gain_that_depends_on_time() -> None:
+    """x' = 0.2 x - k(t) (x - x(t-1)) by another integrator, delay by delay; looked up too."""
+
+    def gain(times: np.ndarray) -> np.ndarray:
+        return (0.5 + 0.8 * np.cos(TURN * times))[..., None, None]
+
+    pieces, exact = [lambda t: np.exp(0.2 * t)], []
+    for k in range(1, 5):
+
+        def rates(t: float, x: np.ndarray) -> np.ndarray:
+            return 0.2 * x - gain(np.array(t))[0, 0] * (x - pieces[-1](t - 1.0))
+
+        first = [pieces[-1](float(k)).item()]
+        run = solve_ivp(rates, (k, k + 1.0), first, method="DOP853", rtol=1e-12, atol=1e-13, dense_output=True)
+        pieces.append(run.sol)
+        exact.append(run.sol(k + 0.5).item())
+    plant, law = FunctionPlant(lambda t, x, u: 0.2 * x + u, 1, 1), DelayedFeedback(gain, 1.0)
+    t = np.arange(1, 5) + 0.5
+    for given in (law, DelayedSum(law, DelayedFeedback([[0.0]], 0.7))):
+        run = MethodOfSteps(40).solve(ClosedLoop(plant, given), [1.0], 5.0)
+        np.testing.assert_allclose(run(t)[:, 0], exact, atol=1e-10)
+        expected = -gain(t)[:, 0, 0] * (run(t) - run(t - 1.0))[:, 0]
+        np.testing.assert_allclose(run.control(t)[:, 0], expected, atol=1e-12)
+
+
+def test_members_with_a_gain_that_depends_on_time_are_switched_on_one_by_one() -> None:
+    def gain(times: np.ndarray) -> np.ndarray:
+        return np.stack([0.1 * np.cos(times), 0.3 + 0.1 * np.sin(times)], axis=-1)[..., None, :]
+
+    t, begin = np.linspace(0.0, 25.0, 60), np.array([TURN, 1.37 * TURN, 2.0 * TURN])
+    whole = MethodOfSteps(30).solve(ClosedLoop(Libration(), DelayedFeedback(gain, TURN, begin)), [0.2, 0.9], 25.0)
+    for i, start in enumerate(begin):
+        single = MethodOfSteps(30).solve(ClosedLoop(Libration(), DelayedFeedback(gain, TURN, start)), [0.2, 0.9], 25.0)
+        np.testing.assert_allclose(whole(t)[i], single(t), rtol=0, atol=1e-6)
+        np.testing.assert_array_equal(whole.control(t[t < start])[i], 0.0)
+    free = MethodOfSteps(30).solve(ClosedLoop(Libration()), [0.2, 0.9], 25.0)
+    np.testing.assert_allclose(whole(begin[:, None])[:, 0], free(begin), rtol=0, atol=1e-6)
 
 
 def test_without_delay_there_is_no_control() -> None:
