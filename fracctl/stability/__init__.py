@@ -9,25 +9,39 @@ from fracctl.stability.assess import Verdict, assess
 from fracctl.stability.matignon import PseudoStateVerdict, matignon
 
 if TYPE_CHECKING:
-    from fracctl.stability.floquet import multipliers, real_above_one, residual
+    from fracctl.stability.families import FamilyMember, family, shoot_on_section
+    from fracctl.stability.floquet import Neighbourhood, multipliers, nontrivial_multipliers, real_above_one, residual
+    from fracctl.stability.lyapunov import largest_exponent
     from fracctl.stability.periodic_orbits import PeriodicOrbit, shoot
 
 __all__ = [
+    "FamilyMember",
+    "Neighbourhood",
     "PeriodicOrbit",
     "PseudoStateVerdict",
     "Verdict",
     "assess",
+    "family",
+    "largest_exponent",
     "matignon",
     "multipliers",
+    "nontrivial_multipliers",
     "real_above_one",
     "residual",
     "shoot",
+    "shoot_on_section",
 ]
 
 _ORBITS = {
+    "FamilyMember": "families",
+    "Neighbourhood": "floquet",
+    "family": "families",
+    "shoot_on_section": "families",
     "PeriodicOrbit": "periodic_orbits",
     "shoot": "periodic_orbits",
+    "largest_exponent": "lyapunov",
     "multipliers": "floquet",
+    "nontrivial_multipliers": "floquet",
     "real_above_one": "floquet",
     "residual": "floquet",
 }

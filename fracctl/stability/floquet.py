@@ -10,47 +10,141 @@ Source: Just et al., Phys. Rev. Lett. 78 (1997) 203; for R Bleich and Socolar, P
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from fracctl.arrays import Complexes, Floats, finite, share
+from fracctl.controllers.delayed_feedback import GainFunction
 from fracctl.errors import ArgumentError
+from fracctl.fractional.collocation import chebyshev_nodes
 from fracctl.stability.periodic_orbits import PeriodicOrbit
 
 FEWEST_NODES = 40
 
 
 def multipliers(
-    orbit: PeriodicOrbit, gain: ArrayLike | None = None, recall: float = 0.0, nodes: int = 100
+    orbit: PeriodicOrbit, gain: ArrayLike | GainFunction | None = None, recall: float = 0.0, nodes: int = 100
 ) -> Complexes:
     """Return the multipliers by descending magnitude: n of the free motion, otherwise those the nodes resolve.
 
     Args:
         orbit: the target orbit; the delay is its period.
-        gain: K, (m, n); None for free motion.
+        gain: K, (m, n), or a function K(t) of times (1, k) that returns (1, k, m, n); None for free motion.
         recall: R in [0, 1).
         nodes: Chebyshev nodes in a period, at least 40. Multipliers below 1e-3 are not to be relied on.
 
     Raises:
         ArgumentError: a number is out of its range, or the gain has a wrong shape.
     """
-    if gain is None:
-        return _eigenvalues(orbit.transition())
-    matrix, recall = _gain(orbit, gain), share("recall", recall)
-    if nodes < FEWEST_NODES:
-        raise ArgumentError("nodes", nodes, f"must be at least {FEWEST_NODES}")
-    state, reference = _responses(orbit, matrix, nodes)
-    old, own = state + (1.0 - recall) * reference, recall * reference
-    if recall == 0.0:
-        return _eigenvalues(old)
-    one = np.eye(len(old))
-    return _eigenvalues(np.block([[old, own], [(1.0 - recall) * one, recall * one]]))
+    return _eigenvalues(orbit.transition()) if gain is None else Neighbourhood(orbit, nodes).multipliers(gain, recall)
 
 
-def residual(orbit: PeriodicOrbit, gain: ArrayLike, multiplier: complex, recall: float = 0.0) -> float:
+def nontrivial_multipliers(
+    orbit: PeriodicOrbit, gain: ArrayLike | GainFunction | None = None, recall: float = 0.0, nodes: int = 100
+) -> Complexes:
+    """Return the multipliers but those 1 that belong to a periodic solution of the free linearised equation.
+
+    Where y' = A(t) y has solutions of period T, i.e. (Φ(T) - I) y(0) = 0, the control does not see them: each is an
+    eigenvector of the monodromy operator to the multiplier 1, whatever the gain. So are the tangent of an orbit of a
+    plant that does not depend on time, and of a family of orbits of equal period its other directions. These
+    eigenvectors are known (`periodic_directions`) and are deflated; what is left is complete, another 1 among it.
+
+    Args and errors are those of `multipliers`.
+    """
+    if gain is not None:
+        return Neighbourhood(orbit, nodes).nontrivial(gain, recall)
+    free = orbit.transition().real
+    rest = _complement(periodic_directions(orbit, free))
+    return _eigenvalues(rest.T @ free @ rest)
+
+
+def periodic_directions(orbit: PeriodicOrbit, free: Floats | None = None, margin: float = 1e-6) -> Floats:
+    """Return an orthonormal basis of the y with Φ(T) y = y to within the margin, relative to |Φ(T)|, (n, q).
+
+    Args:
+        orbit: the orbit.
+        free: Φ(T), (n, n), where it is known.
+        margin: of the singular values of Φ(T) - I.
+    """
+    transition = orbit.transition().real if free is None else free
+    _, values, right = np.linalg.svd(transition - np.eye(len(transition)))
+    return np.ascontiguousarray(right[values <= margin * np.linalg.norm(transition, 2)].T)
+
+
+class Neighbourhood:
+    """The motion near a periodic orbit on Chebyshev nodes, for the multipliers of many gains.
+
+    Args:
+        orbit: the target orbit; the delay is its period.
+        nodes: Chebyshev nodes in a period, at least 40.
+
+    Raises:
+        ArgumentError: there are too few nodes.
+    """
+
+    def __init__(self, orbit: PeriodicOrbit, nodes: int = 100) -> None:
+        if nodes < FEWEST_NODES:
+            raise ArgumentError("nodes", nodes, f"must be at least {FEWEST_NODES}")
+        rule = chebyshev_nodes(nodes)
+        self.orbit, self.times = orbit, orbit.period * rule.t
+        self._a, self._b = orbit.jacobians(self.times)
+        self._slope = np.kron(rule.slope / orbit.period, np.eye(self._a.shape[1]))
+
+    def multipliers(self, gain: ArrayLike | GainFunction, recall: float = 0.0) -> Complexes:
+        """Return what the function `multipliers` does."""
+        return _eigenvalues(self._monodromy(gain, recall))
+
+    def nontrivial(self, gain: ArrayLike | GainFunction, recall: float = 0.0) -> Complexes:
+        """Return what `nontrivial_multipliers` does."""
+        rest, matrix = self._other_motions, self._monodromy(gain, recall)
+        if len(matrix) > len(rest):
+            modes = self._modes
+            rest = _complement(np.concatenate([modes, modes]))
+        return _eigenvalues(rest.T @ matrix @ rest)
+
+    @cached_property
+    def _modes(self) -> Floats:
+        """The periodic solutions of the free linearised equation at the nodes, one below the other, (t n, q)."""
+        modes = self.orbit.motions(periodic_directions(self.orbit), self.times)
+        return modes.reshape(len(self._slope), -1)
+
+    @cached_property
+    def _other_motions(self) -> Floats:
+        return _complement(self._modes)
+
+    def _monodromy(self, gain: ArrayLike | GainFunction, recall: float) -> Floats:
+        """Return what takes states at the nodes of a period (and references, for R > 0) to those of the next."""
+        recall = share("recall", recall)
+        state, reference = self._responses(_gains(self.orbit, gain, self.times))
+        old, own = state + (1.0 - recall) * reference, recall * reference
+        if recall == 0.0:
+            return old
+        one = np.eye(len(old))
+        return np.block([[old, own], [(1.0 - recall) * one, recall * one]])
+
+    def _responses(self, gains: Floats) -> tuple[Floats, Floats]:
+        """Return what states at the nodes of a period owe to the last state before it, and to the reference in it."""
+        n, fed = self._a.shape[1], self._b @ gains
+        left, right = self._slope.copy(), np.zeros_like(self._slope)
+        for i in range(len(self.times)):
+            block = slice(i * n, (i + 1) * n)
+            left[block, block] -= self._a[i] - fed[i]
+            right[block, block] = fed[i]
+        left[:n], right[:n] = 0.0, 0.0
+        left[:n, :n] = np.eye(n)
+        first = np.eye(len(left), n)
+        both = np.linalg.solve(left, np.concatenate([first, right], axis=1))
+        state = np.zeros_like(left)
+        state[:, -n:] = both[:, :n]
+        return state, both[:, n:]
+
+
+def residual(orbit: PeriodicOrbit, gain: ArrayLike | GainFunction, multiplier: complex, recall: float = 0.0) -> float:
     """Return the smallest singular value of Φ_μ(T) - μ I over the largest; 0 for an exact multiplier."""
     factor = (multiplier - 1.0) / (multiplier - recall)
-    transition = orbit.transition(factor * _gain(orbit, gain).astype(np.complex128))
+    transition = orbit.transition(lambda t: factor * _gains(orbit, gain, np.array([t]))[0].astype(np.complex128))
     values = np.linalg.svd(transition - multiplier * np.eye(len(transition)), compute_uv=False)
     return float(values[-1] / values[0])
 
@@ -65,42 +159,18 @@ def real_above_one(values: Complexes, margin: float = 1e-6) -> int:
     return int(np.count_nonzero(real & (values.real > 1.0 + margin)))
 
 
-def _responses(orbit: PeriodicOrbit, gain: Floats, nodes: int) -> tuple[Floats, Floats]:
-    """Return what states at the nodes of a period owe to the last state before it, and to the reference in it."""
-    t, slope = _chebyshev(nodes, orbit.period)
-    a, b = orbit.jacobians(t)
-    n, fed = a.shape[1], b @ gain
-    left = np.kron(slope, np.eye(n))
-    right = np.zeros_like(left)
-    for i in range(nodes):
-        block = slice(i * n, (i + 1) * n)
-        left[block, block] -= a[i] - fed[i]
-        right[block, block] = fed[i]
-    left[:n], right[:n] = 0.0, 0.0
-    left[:n, :n] = np.eye(n)
-    start = np.zeros_like(left)
-    start[:n, -n:] = np.eye(n)
-    both = np.linalg.solve(left, np.concatenate([start, right], axis=1))
-    return both[:, : len(left)], both[:, len(left) :]
+def _gains(orbit: PeriodicOrbit, gain: ArrayLike | GainFunction, times: Floats) -> Floats:
+    """Return K at times (t,), (t, m, n)."""
+    values = finite("gain", gain(times[None])[0] if callable(gain) else gain)
+    shape = (orbit.plant.n_controls, orbit.plant.n_states)
+    if values.shape[-2:] != shape or values.ndim != 2 + callable(gain):
+        raise ArgumentError("gain", f"of shape {values.shape}", f"must have shape {shape} for this plant")
+    return np.broadcast_to(values, (len(times), *shape))
 
 
-def _chebyshev(nodes: int, length: float) -> tuple[Floats, Floats]:
-    """Return Chebyshev-Lobatto nodes in [0, length] and the matrix of the derivative at them."""
-    k = np.arange(nodes)
-    t = length * np.sin(0.5 * np.pi * k / (nodes - 1)) ** 2
-    weights = np.where(k % 2 == 0, 1.0, -1.0)
-    weights[[0, -1]] *= 0.5
-    slope = weights / weights[:, None] / (t[:, None] - t + np.eye(nodes))
-    np.fill_diagonal(slope, 0.0)
-    np.fill_diagonal(slope, -slope.sum(axis=1))
-    return t, slope
-
-
-def _gain(orbit: PeriodicOrbit, gain: ArrayLike) -> Floats:
-    matrix, shape = finite("gain", gain), (orbit.plant.n_controls, orbit.plant.n_states)
-    if matrix.shape != shape:
-        raise ArgumentError("gain", f"of shape {matrix.shape}", f"must have shape {shape} for this plant")
-    return matrix
+def _complement(known: Floats) -> Floats:
+    """Return an orthonormal basis of what is orthogonal to some columns."""
+    return np.asarray(np.linalg.qr(known, mode="complete")[0][:, known.shape[1] :], dtype=np.float64)
 
 
 def _eigenvalues(matrix: Complexes | Floats) -> Complexes:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -9,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.integrate import solve_ivp
 
-from fracctl.arrays import Complexes, Floats, finite
+from fracctl.arrays import Array, Complexes, Floats, finite
 from fracctl.errors import ArgumentError
 from fracctl.loop import ClosedLoop
 from fracctl.plants.state import StatePlant
@@ -49,19 +50,26 @@ class PeriodicOrbit:
         states = self.trajectory(times)
         return self.plant.jacobians(times, states, np.zeros((len(times), self.plant.n_controls)))
 
-    def transition(self, gain: Complexes | None = None) -> Complexes:
-        """Return Φ(T), (n, n), of y' = (A - B G) y with a constant, perhaps complex, gain G (m, n); None for free."""
-        n = self.plant.n_states
+    def transition(self, gain: Callable[[float], Complexes] | None = None) -> Complexes:
+        """Return Φ(T), (n, n), of y' = (A - B G(t)) y with a perhaps complex gain G, (m, n); None for free."""
+        start = np.eye(self.plant.n_states, dtype=np.float64 if gain is None else np.complex128)
+        return np.asarray(self._linear(start, np.array([self.period]), gain)[0], dtype=np.complex128)
 
-        def rates(t: float, y: Complexes) -> Complexes:
+    def motions(self, start: Floats, times: Floats) -> Floats:
+        """Return the solutions of y' = A y at times (t,) from y(0) = start, (n, q), as (t, n, q)."""
+        return self._linear(start, times)
+
+    def _linear(self, start: Array, times: Floats, gain: Callable[[float], Complexes] | None = None) -> Array:
+        def rates(t: float, y: Array) -> Array:
             a, b = self.jacobians(np.array([t]))
-            matrix = a[0] if gain is None else a[0] - b[0] @ gain
-            rate: Complexes = (matrix @ y.reshape(n, n)).ravel()
+            matrix = a[0] if gain is None else a[0] - b[0] @ gain(t)
+            rate: Array = (matrix @ y.reshape(start.shape)).ravel()
             return rate
 
-        start = np.eye(n, dtype=np.complex128).ravel()
-        run = solve_ivp(rates, (0.0, self.period), start, method="DOP853", rtol=_RTOL, atol=_ATOL)
-        return np.asarray(run.y[:, -1], dtype=np.complex128).reshape(n, n)
+        span = (0.0, self.period)
+        run = solve_ivp(rates, span, start.ravel(), method="DOP853", t_eval=times, rtol=_RTOL, atol=_ATOL)
+        shape = (len(times), *start.shape)
+        return np.asarray(run.y).T.reshape(shape) if run.success else np.full(shape, np.nan)
 
 
 def shoot(

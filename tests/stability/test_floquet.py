@@ -11,9 +11,10 @@ from fracctl.controllers import DelayedFeedback
 from fracctl.design.lqr import lqr
 from fracctl.errors import ArgumentError
 from fracctl.loop import ClosedLoop
-from fracctl.plants import HCW, Chief, FunctionPlant, Libration, RelativeMotion
+from fracctl.plants import HCW, Chief, FunctionPlant, Libration, RelativeMotion, RotatingEllipsoid
 from fracctl.solvers import MethodOfSteps
-from fracctl.stability import PeriodicOrbit, multipliers, real_above_one, residual, shoot
+from fracctl.stability import PeriodicOrbit, multipliers, nontrivial_multipliers, real_above_one, residual, shoot
+from fracctl.stability.floquet import periodic_directions
 
 TURN = 2.0 * np.pi
 
@@ -86,10 +87,46 @@ def test_runs_decay_as_the_largest_multiplier_says() -> None:
 )
 def test_formation_against_the_weight_of_control(beta: float, expected: float) -> None:
     """LQR of Hill's equations, Q = I, R = βI; five multipliers are 1, for the family of orbits of equal period."""
-    values = np.abs(multipliers(formation(), lqr(HCW(), 1.0, beta)))
-    unit = np.sort(np.argsort(np.abs(values - 1.0))[:5])
-    np.testing.assert_allclose(values[unit], 1.0, atol=1e-5)
-    assert np.delete(values, unit)[0] == pytest.approx(expected, abs=2e-3)
+    gain = lqr(HCW(), 1.0, beta)
+    assert abs(nontrivial_multipliers(formation(), gain)[0]) == pytest.approx(expected, abs=2e-3)
+    assert np.count_nonzero(np.abs(multipliers(formation(), gain) - 1.0) < 1e-5) == 5
+
+
+@pytest.mark.parametrize("recall", [0.0, 0.4])
+def test_deflation_leaves_all_other_multipliers(recall: float) -> None:
+    """About Eros the tangent alone belongs to a periodic solution, and the multipliers are 1 and the deflated ones."""
+    plant = RotatingEllipsoid()
+    orbit = shoot(plant, [-0.187, 0.937, 1.866, 0.335], 3.10656)
+    direction = periodic_directions(orbit)
+    tangent = plant.rates(np.zeros(1), orbit.state[None], np.zeros((1, 2)))[0]
+    np.testing.assert_allclose(np.abs(direction[:, 0] @ tangent), np.linalg.norm(tangent), rtol=1e-8)
+    assert direction.shape == (4, 1)
+    gain = [[0.0525, -0.1243, 0.1169, 0.0373], [0.1243, 0.0525, -0.0373, 0.1169]]
+    all_values = list(multipliers(orbit, gain, recall)[:6])
+    others = nontrivial_multipliers(orbit, gain, recall)[:5]
+    unit = min(all_values, key=lambda value: abs(value - 1.0))
+    assert unit == pytest.approx(1.0, abs=1e-9)
+    all_values.remove(unit)
+    np.testing.assert_allclose(np.sort_complex(all_values), np.sort_complex(others), atol=1e-7)
+
+
+def test_a_one_that_no_periodic_solution_has_is_kept() -> None:
+    """x'' = 0: Φ = [[1, T], [0, 1]] has the multiplier 1 twice and one periodic solution."""
+    plant = FunctionPlant(lambda t, x, u: np.stack([x[:, 1], u[:, 0]], 1), 2, 1)
+    assert nontrivial_multipliers(PeriodicOrbit(plant, np.zeros(2), 1.0)) == pytest.approx([1.0])
+    assert nontrivial_multipliers(libration()) == pytest.approx(multipliers(libration()))
+
+
+def test_a_gain_that_depends_on_time() -> None:
+    """x' = a x - k(t) (x - x(t-T)) about 0: μ = exp(a T - (1 - 1/μ) ∫ k dt); the recall divides by μ - R."""
+    plant = FunctionPlant(lambda t, x, u: 0.3 * x + u, 1, 1)
+    orbit = PeriodicOrbit(plant, np.zeros(1), 1.5)
+    for recall in (0.0, 0.4):
+        values = multipliers(orbit, lambda t: 0.4 + np.sin(TURN * t / 1.5)[..., None, None], recall)
+        assert abs(values[0]) > 1.0
+        for value in values[: 1 if recall else 3]:
+            factor = (value - 1.0) / (value - recall)
+            assert abs(np.exp((0.3 - 0.4 * factor) * 1.5) / value - 1.0) < 1e-8
 
 
 def test_a_constant_orbit_has_the_multipliers_of_the_characteristic_equation() -> None:
