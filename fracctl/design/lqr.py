@@ -34,15 +34,25 @@ def lqr(plant: LinearPlant, q: ArrayLike = 1.0, r: ArrayLike = 1.0, round_to: fl
     m = plant.n_controls
     a = np.block([[np.zeros((m, m)), np.eye(m)], [plant.stiffness, plant.damping]])
     b = np.concatenate([np.zeros((m, m)), np.eye(m)])
-    state, control = _weight("q", q, 2 * m), _weight("r", r, m, definite=True)
+    gains = regulator(a, b, weight("q", q, 2 * m), weight("r", r, m, definite=True))[0]
+    return gains if round_to is None else _rounded(gains, round_to)
+
+
+def regulator(a: Floats, b: Floats, q: Floats, r: Floats) -> tuple[Floats, Floats]:
+    """Return K, (m, n), and P, (n, n), of x' = A x + B u with matrices Q (n, n) and R (m, m).
+
+    Raises:
+        ArgumentError: no gains stabilise the plant at a finite cost.
+    """
     try:
-        gains: Floats = np.linalg.solve(control, b.T @ solve_continuous_are(a, b, state, control))
+        solution = np.asarray(solve_continuous_are(a, b, q, r), dtype=np.float64)
+        gains = np.asarray(np.linalg.solve(r, b.T @ solution), dtype=np.float64)
         stable = bool(np.linalg.eigvals(a - b @ gains).real.max() < 0.0)
     except np.linalg.LinAlgError:
         stable = False
     if not stable:
-        raise ArgumentError("q", _diagonal(state), "must weigh every motion that does not die out by itself")
-    return gains if round_to is None else _rounded(gains, round_to)
+        raise ArgumentError("q", _diagonal(q), "must weigh every motion that does not die out by itself")
+    return gains, solution
 
 
 def gains_by_name(components: Sequence[str], gains: Floats) -> dict[str, Floats]:
@@ -55,7 +65,8 @@ def gains_by_name(components: Sequence[str], gains: Floats) -> dict[str, Floats]
     return values
 
 
-def _weight(name: str, value: ArrayLike, size: int, definite: bool = False) -> Floats:
+def weight(name: str, value: ArrayLike, size: int, definite: bool = False) -> Floats:
+    """Return a number, a diagonal (size,) or a matrix as a matrix; refuse what is not symmetric or has a wrong sign."""
     array = finite(name, value)
     if array.ndim < 2 and array.shape in ((), (size,)):
         array = np.diag(np.broadcast_to(array, size))
