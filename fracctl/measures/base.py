@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Protocol, runtime_checkable
 
 from fracctl.arrays import Floats
+from fracctl.stepwise import StepwiseTrajectory
 from fracctl.trajectory import Trajectory
 
 
@@ -16,5 +17,17 @@ class Measure(Protocol):
     columns: tuple[str, ...]
 
     def __call__(self, trajectory: Trajectory) -> dict[str, Floats]:
+        """Return each column as (b,)."""
+        ...
+
+
+@runtime_checkable
+class StepwiseMeasure(Protocol):
+    """A named function of trajectories of the method of steps."""
+
+    name: str
+    columns: tuple[str, ...]
+
+    def __call__(self, trajectory: StepwiseTrajectory) -> dict[str, Floats]:
         """Return each column as (b,)."""
         ...
