@@ -16,7 +16,7 @@ from pathlib import Path
 import pandas as pd
 from matplotlib.figure import Figure
 
-from benchmarks import comparison, figures, machine, processes, report, throughput, work_precision
+from benchmarks import comparison, delays, figures, machine, processes, report, throughput, work_precision
 from benchmarks.verdicts import Verdict
 
 FOLDER = Path("outputs/bench")
@@ -24,6 +24,7 @@ SECTIONS = {
     "throughput": "Certified evaluations a second, one core",
     "comparison": "The engine and its peers, one core, each at its own error",
     "work_precision": "The project's solvers, error and time per trajectory",
+    "delays": "Delayed feedback and jitcdde, one core, each at its own error",
     "processes": "Start-up, whole runs, memory",
 }
 
@@ -62,6 +63,8 @@ def _measured(name: str) -> tuple[pd.DataFrame, list[Verdict], list[str]]:
             return *throughput.measure(), []
         if name == "comparison":
             return comparison.measure()
+        if name == "delays":
+            return delays.measure()
         return work_precision.measure(), [], []
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from threadpoolctl import threadpool_info  # type: ignore[import-untyped]
 
-PACKAGES = ("fracctl", "numpy", "scipy", "numba", "pycaputo", "nilt-python", "pymittagleffler", "mpmath")
+PACKAGES = ("fracctl", "numpy", "scipy", "numba", "pycaputo", "nilt-python", "pymittagleffler", "jitcdde", "mpmath")
 
 
 @contextmanager
