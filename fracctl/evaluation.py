@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
@@ -74,6 +74,9 @@ class Evaluation:
     """Name of the primary objective."""
     horizon: float
 
+    has_poles: ClassVar[bool] = True
+    """Whether a characteristic equation decides on stability."""
+
     def __post_init__(self) -> None:
         known = [column for measure in self.measures for column in measure.columns]
         for name, columns in self.objectives.items():
@@ -139,6 +142,22 @@ class Evaluation:
         """Return the trajectory of one design point, over `horizon` or the evaluation's own."""
         state = self.initial_conditions[initial_condition]
         return self.solver.solve(self.loop(design), state, horizon or self.horizon)
+
+    @property
+    def trajectory_samples(self) -> int:
+        """How many times of a trajectory are stored, uniform from 0 to the horizon."""
+        return 2001
+
+    @property
+    def sampled_columns(self) -> tuple[str, ...]:
+        """Columns of stored trajectories: states, then controls."""
+        return (*self.plant.state_names, *(f"control_{component}" for component in self.plant.components))
+
+    def sampled(self, trajectory: Trajectory, times: Floats) -> dict[str, Floats]:
+        """Return the `sampled_columns` of a single trajectory at times (t,), (t,) each."""
+        states = trajectory(times)[:, : self.plant.n_states]
+        samples = np.concatenate([states, trajectory.control(times)], axis=1)
+        return dict(zip(self.sampled_columns, samples.T, strict=True))
 
     def _full_design(self, design: Mapping[str, Floats]) -> dict[str, Floats]:
         defaults = {p.name: p.default for p in self.law.parameters(self.plant.components)} | dict(self.parameters)

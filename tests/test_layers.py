@@ -30,6 +30,7 @@ BOTTOM_UP = (
     "design",
     "measures",
     "evaluation",
+    "delayed_evaluation",
     "accuracy",
     "surveys",
     "comparison",

@@ -15,6 +15,8 @@ from fracctl.config.fields import lines_of, refuse
 from fracctl.config.messages import InvalidConfiguration, problems
 from fracctl.config.options import construct
 from fracctl.config.schemas import AccuracyEvaluation, ComparisonEvaluation, GridSurvey, RunConfig, SingleSurvey
+from fracctl.config.schemas import DelayedEvaluation as DelayedOptions
+from fracctl.controllers import Saturation
 from fracctl.errors import ArgumentError, ConfigurationError
 from fracctl.evaluation import Evaluation
 from fracctl.plants import LinearPlant
@@ -37,15 +39,23 @@ def build_evaluation(config: RunConfig) -> Evaluation:
 
         options = config.evaluation.model_dump(exclude={"type"})
         return accuracy.AccuracyEvaluation(**common, measures=(), objectives={}, objective="", **options)
-    measures = tuple(construct(registry.load("measures", name), options) for name, options in config.measures.items())
+    measures: tuple[Any, ...] = tuple(
+        construct(registry.load("measures", name), options) for name, options in config.measures.items()
+    )
     if isinstance(config.evaluation, ComparisonEvaluation):
         return _comparison(config, config.evaluation, common | {"measures": measures})
-    return Evaluation(
-        **common,
-        measures=measures,
-        objectives={name: tuple(columns) for name, columns in config.objectives.items()},
-        objective=config.objective,
-    )
+    common |= {
+        "measures": measures,
+        "objectives": {name: tuple(columns) for name, columns in config.objectives.items()},
+        "objective": config.objective,
+    }
+    if isinstance(config.evaluation, DelayedOptions):
+        from fracctl.delayed_evaluation import DelayedEvaluation
+
+        limit, by = config.evaluation.largest_control, config.evaluation.largest_by
+        saturation = None if limit is None else Saturation(limit, by)
+        return DelayedEvaluation(**common, delay_from=config.evaluation.delay_from, saturation=saturation)
+    return Evaluation(**common)
 
 
 def _comparison(config: RunConfig, given: ComparisonEvaluation, common: Mapping[str, Any]) -> Evaluation:
@@ -96,11 +106,20 @@ def build_checked(config: RunConfig) -> tuple[Evaluation, Survey]:
     Raises:
         ConfigurationError: the solver does not take such a loop.
     """
+    _check_kinds(config)
     evaluation = build_evaluation(config)
     refused = evaluation.solver.supports(evaluation.loop({}))
     if refused is not None:
         raise ConfigurationError(f"solver.type = {config.solver.type}: {refused}")
     return evaluation, build_survey(config, evaluation)
+
+
+def _check_kinds(config: RunConfig) -> None:
+    """Delayed feedback is evaluated by its own solver, all else by the others."""
+    kind, solver = config.evaluation.type, config.solver.type
+    if (kind == "delayed") != (solver == "method_of_steps"):
+        cure = "evaluation=delayed and solver=method_of_steps go together"
+        raise ConfigurationError(f"evaluation.type = {kind}: does not go with solver.type = {solver}; {cure}")
 
 
 def build_plant(config: RunConfig) -> LinearPlant:

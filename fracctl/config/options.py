@@ -128,6 +128,8 @@ def _schema(hint: Any) -> Any:
     """What a value of this annotation may look like in a configuration."""
     if hint == ArrayLike:
         return Annotated[Any, AfterValidator(_numbers)]
+    if hint == ArrayLike | None:
+        return Annotated[Any, AfterValidator(_numbers)] | None
     if hint in (float, int, bool):
         return {float: Number, int: Whole, bool: Annotated[bool, Field(strict=True)]}[hint]
     if isinstance(hint, type) and dataclasses.is_dataclass(hint):

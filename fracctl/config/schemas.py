@@ -57,6 +57,18 @@ class AccuracyEvaluation(Typed):
     """How often it is timed."""
 
 
+class DelayedEvaluation(Typed):
+    """Runs under delayed feedback."""
+
+    type: Literal["delayed"]
+    delay_from: Literal["given", "period", "first_return"] = "given"
+    """Where τ comes from: `controller.delay`, the plant's own period, or the first return of the free motion."""
+    largest_control: Annotated[Number, Field(gt=0.0)] | None = None
+    """What the thrusters can give, dimensionless; None for any."""
+    largest_by: Literal["norm", "axis"] = "norm"
+    """Whether that limits the magnitude or each component."""
+
+
 class ComparedLaw(Typed):
     """A law of a comparison."""
 
@@ -120,6 +132,10 @@ class Figure(Typed):
         "work_precision",
         "settling_against_band",
         "settling_against_effort",
+        "orbits",
+        "feedback",
+        "drift",
+        "multiplier_window",
     ]
     objective: str | None = None
     """Whose optima are shown; None for the primary one."""
@@ -132,6 +148,7 @@ EVALUATIONS: Mapping[str, type[Typed]] = {
     "performance": PerformanceEvaluation,
     "accuracy": AccuracyEvaluation,
     "comparison": ComparisonEvaluation,
+    "delayed": DelayedEvaluation,
 }
 SCHEDULERS: Mapping[str, type[Typed]] = {"serial": SerialScheduler, "local": LocalScheduler}
 

@@ -34,8 +34,6 @@ from fracctl.store.identity import canonical_json
 from fracctl.store.run_directory import RunDirectory
 from fracctl.surveys import Optima, Survey
 
-TRAJECTORY_SAMPLES = 2001
-"""Times in ``trajectories.parquet``, uniform from 0 to the horizon."""
 TRAJECTORY_KINDS = ("overall", "baseline")
 
 _log = logging.getLogger(__name__)
@@ -164,7 +162,11 @@ class Computation:
         self._directory.write_evaluations(self._evaluations_schema, store.tables())
         tally = Tally()
         selection = Optima(
-            evaluation.objectives, evaluation.design_variables, self._survey.slices, self._survey.baseline
+            evaluation.objectives,
+            evaluation.design_variables,
+            self._survey.slices,
+            self._survey.baseline,
+            any_baseline=not evaluation.has_poles,
         )
         for rows in self._directory.stream_evaluations():
             tally.add(rows)
@@ -198,6 +200,6 @@ class Computation:
     def _trajectories(self) -> None:
         optima = self._directory.optima()
         shown = optima[optima["kind"].isin(TRAJECTORY_KINDS)]
-        times = np.linspace(0.0, self._evaluation.horizon, TRAJECTORY_SAMPLES)
+        times = np.linspace(0.0, self._evaluation.horizon, self._evaluation.trajectory_samples)
         rows = trajectories(self._evaluation, shown, times)
         self._directory.write_trajectories(schema(tuple(rows), metadata=self._metadata), rows)

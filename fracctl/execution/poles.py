@@ -41,6 +41,8 @@ class Poles:
 
     def add_to(self, optima: Iterable[dict[str, Any]]) -> None:
         """Add `COLUMNS` to the rows of optima."""
+        if not self.evaluation.has_poles:
+            return
         for run, row in enumerate(optima):
             point = tuple(float(row[name]) for name in self.evaluation.design_variables)
             if point not in self._poles:

@@ -29,6 +29,8 @@ def notes_on_tails(evaluation: Evaluation, found: Iterable[Mapping[str, Any]]) -
         evaluation: solves the optima again over twice the horizon.
         found: results by objective and initial condition, with their `optimum`.
     """
+    if not evaluation.has_poles:
+        return []
     with_effort = [name for name, columns in evaluation.objectives.items() if "control_effort" in columns]
     notes = []
     for result in found:

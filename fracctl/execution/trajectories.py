@@ -8,26 +8,20 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from fracctl.arrays import Array, Floats
+from fracctl.arrays import Array, Floats, joined
 from fracctl.evaluation import Evaluation
 
 
 def trajectories(evaluation: Evaluation, optima: pd.DataFrame, times: Floats) -> dict[str, Array]:
     """Return the columns of ``trajectories.parquet``: `run` (the index of the optimum), `time`, states, controls."""
-    plant = evaluation.plant
-    names = (*plant.state_names, *(f"control_{component}" for component in plant.components))
-    solved = [_samples(evaluation, row, times) for row in optima.to_dict("records")]
-    samples = np.concatenate(solved) if solved else np.zeros((0, len(names)))
-    columns: dict[str, Array] = {
-        "run": np.repeat(optima.index.to_numpy(dtype=np.int64), times.size),
-        "time": np.tile(times, len(optima)),
-    }
-    return columns | {name: samples[:, i] for i, name in enumerate(names)}
+    nothing = {name: np.zeros(0) for name in ("time", *evaluation.sampled_columns)}
+    parts = [{"run": np.zeros(0, dtype=np.int64)} | nothing]
+    for run, row in zip(optima.index.tolist(), optima.to_dict("records"), strict=True):
+        parts.append({"run": np.full(times.size, run)} | _samples(evaluation, row, times))
+    return joined(parts)
 
 
-def _samples(evaluation: Evaluation, row: Mapping[Any, Any], times: Floats) -> Floats:
-    """States and controls, (t, n + m)."""
+def _samples(evaluation: Evaluation, row: Mapping[Any, Any], times: Floats) -> dict[str, Array]:
     design = {name: float(row[name]) for name in evaluation.design_variables}
     trajectory = evaluation.solve(design, str(row["initial_condition"]))
-    states = trajectory(times)[:, : len(evaluation.plant.state_names)]
-    return np.concatenate([states, trajectory.control(times)], axis=1)
+    return {"time": times} | evaluation.sampled(trajectory, times)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -75,3 +76,16 @@ def curves_of(results: Results, selection: Selection, initial_condition: str) ->
     if not curves:
         raise FigureError(f"no trajectory of an optimum of {selection.objective} is stored for '{initial_condition}'")
     return curves
+
+
+def table_of(curves: Mapping[str, Sequence[Curve]]) -> pd.DataFrame:
+    """Return the samples of all curves by initial condition, one after the other."""
+    parts = []
+    for initial_condition, pair in curves.items():
+        for curve in pair:
+            part = curve.samples.drop(columns="run").reset_index(drop=True)
+            part.insert(1, "periods", curve.times / math.tau)
+            part.insert(0, "kind", curve.kind)
+            part.insert(0, "initial_condition", initial_condition)
+            parts.append(part)
+    return pd.concat(parts, ignore_index=True)

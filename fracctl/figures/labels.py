@@ -8,10 +8,15 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 _MEASURES = {
+    "beta": ("Weight of the control", r"\beta"),
+    "recall": ("Recall", "R"),
+    "delay": ("Delay", r"\tau"),
+    "periodicity_error": ("Periodicity error", "e"),
     "settling_time": ("Settling time", r"\mathrm{ST}"),
     "overshoot": ("Overshoot", r"\mathrm{OS}"),
     "control_effort": ("Control effort", "U"),
 }
+_GREEK = {"phi": r"\varphi"}
 _PREFIXES = {
     "alpha": r"\alpha_{%s}",
     "lambda": r"\lambda_{%s}",
@@ -21,6 +26,7 @@ _PREFIXES = {
     "k_i": "k_{I_{%s}}",
     "k_d_alpha": r"k_{D^\alpha_{%s}}",
     "k_d": "k_{D_{%s}}",
+    "gain": "K_{%s}",
     "control": r"\upsilon_{%s}",
 }
 """The first that a column begins with counts."""
@@ -33,6 +39,8 @@ def symbol(column: str) -> str:
     """Symbol of a column, for use between dollar signs: ``k_p_w`` is k_{P_w}, ``w_dot`` is w'."""
     if column in _MEASURES:
         return _MEASURES[column][1]
+    if entry := re.fullmatch(r"gain_(\d)_(\d)", column):
+        return f"K_{{{entry[1]}{entry[2]}}}"
     for prefix, form in _PREFIXES.items():
         if column.startswith(f"{prefix}_"):
             return form % _upright(column.removeprefix(f"{prefix}_"))
@@ -51,12 +59,16 @@ def objective(columns: Sequence[str]) -> str:
 
 
 def initial_condition(name: str) -> str:
-    """``ic1`` is IC1; other names lose their underscores."""
+    """``ic1`` is IC1, ``rho_1_9`` ρ = 1.9; other names lose their underscores."""
+    if found := re.fullmatch(r"rho_(\d+)_(\d+)", name):
+        return rf"$\rho = {found[1]}.{found[2]}$"
     return name.upper() if re.fullmatch(r"ic\d+", name) else name.replace("_", " ")
 
 
 def controller(row: Mapping[str, Any]) -> str:
     """The law of a row of optima, e.g. PD^α with α_w = 0.91; its gains too where there are but two."""
+    if "delay" in row:
+        return "free motion" if row["gain_factor"] == 0.0 else "delayed feedback"
     orders = [name for name in row if name.startswith(("alpha_", "lambda_", "mu_", "time_constant_"))]
     gains = [name for name in row if name.startswith("k_")]
     shown = orders + (gains if len(gains) <= 2 else [])
@@ -110,6 +122,8 @@ def _unit(largest: float, ladder: Sequence[tuple[float, str]]) -> tuple[float, s
 
 
 def _upright(name: str) -> str:
+    if name in _GREEK:
+        return _GREEK[name]
     return name if len(name) <= 2 else rf"\mathrm{{{name.replace('_', ' ')}}}".replace(" ", r"\ ")
 
 

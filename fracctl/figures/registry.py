@@ -12,8 +12,12 @@ from matplotlib.figure import Figure
 
 from fracctl.errors import ConfigurationError, FracctlError, suggestion
 from fracctl.figures import (
+    drift,
+    feedback,
     gain_contours,
+    multiplier_window,
     objective_against_order,
+    orbits,
     order_contours,
     pareto_fronts,
     poles,
@@ -37,6 +41,10 @@ TYPES: Mapping[str, Callable[[Results, Selection], tuple[Figure, pd.DataFrame]]]
     "work_precision": work_precision.build,
     "settling_against_band": settling_against_band.build,
     "settling_against_effort": settling_against_effort.build,
+    "orbits": orbits.build,
+    "feedback": feedback.build,
+    "drift": drift.build,
+    "multiplier_window": multiplier_window.build,
 }
 """Type in the configuration to the function that makes the figure and the table behind it."""
 

@@ -10,14 +10,18 @@ from typing import Any
 
 import pandas as pd
 
+from fracctl.config import registry
+from fracctl.config.options import construct, typed_options_of
 from fracctl.errors import ConfigurationError, RunError, suggestion
 from fracctl.figures import labels
-from fracctl.plants import Chief
 from fracctl.store import RunDirectory
 from fracctl.units import Scales
 
 Row = Mapping[str, Any]
 """A row of optima, by column."""
+
+_DESIGN = ("alpha_", "lambda_", "mu_", "time_constant_", "k_", "gain_", "beta", "delay", "recall", "switch_on_delays")
+"""What columns of design variables begin with."""
 
 
 class FigureError(RunError):
@@ -88,15 +92,20 @@ class Results:
     @property
     def period_name(self) -> str:
         """What 2π of the dimensionless time is called."""
-        return "orbits" if self._plant["type"].startswith("hcw") else "periods $2\\pi$"
+        kind = self._plant["type"]
+        return "orbits" if kind.startswith("hcw") or kind == "relative_motion" else "periods $2\\pi$"
 
     @cached_property
     def scales(self) -> Scales | None:
         """Lengths and times in SI units, where the plant has them."""
-        if self._plant["type"].startswith("hcw"):
-            return Chief(**self._plant.get("chief", {})).scales
-        given = self._plant.get("scales")
-        return None if given is None else Scales(**given)
+        scales: Scales | None = self.plant.scales
+        return scales
+
+    @cached_property
+    def plant(self) -> Any:
+        """The plant of the run."""
+        factory = registry.load("plants", self._plant["type"])
+        return construct(factory, typed_options_of(factory).model_validate(self._plant))
 
     @property
     def _plant(self) -> dict[str, Any]:
@@ -161,7 +170,7 @@ def objective_scale(results: Results, selection: Selection) -> tuple[float, str]
 
 def same_point(first: Row, second: Row) -> bool:
     """Whether two rows are the same design point."""
-    names = [name for name in first if name.startswith(("alpha_", "lambda_", "mu_", "time_constant_", "k_"))]
+    names = [name for name in first if name.startswith(_DESIGN)]
     return all(first[name] == second[name] for name in names)
 
 

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from fracctl.arrays import Floats
 from fracctl.figures import labels
-from fracctl.figures.curves import Curve, curves_of
+from fracctl.figures.curves import Curve, curves_of, table_of
 from fracctl.figures.results import Results, Selection
 from fracctl.figures.style import BLUE, FULL_WIDTH_IN, GREY, ORANGE, STAR
 
@@ -24,6 +24,7 @@ _SHOWN = 2.2
 _BAND_SHOWN = 4.0
 """The inset shows this many half widths δ to either side of 0."""
 _POINTS = 801
+_POINTS_IN_PERIOD = 60
 _LINES: dict[str, dict[str, Any]] = {
     "baseline": {"color": ORANGE, "linestyle": (0, (4, 1.6))},
     "overall": {"color": BLUE, "linestyle": "-"},
@@ -43,7 +44,7 @@ def build(results: Results, selection: Selection) -> tuple[Figure, pd.DataFrame]
     rows = [(name, component) for name in curves for component in results.components]
     figure = Figure(figsize=(FULL_WIDTH_IN, _PANEL_HEIGHT_IN * len(rows) + _MARGIN_HEIGHT_IN), layout="constrained")
     axes = figure.subplots(len(rows), 2, squeeze=False, sharex=True)
-    times = np.linspace(0.0, _end(results, [curve for pair in curves.values() for curve in pair]), _POINTS)
+    times = np.linspace(0.0, _end(results, [curve for pair in curves.values() for curve in pair]), _points(results))
     for (name, component), (left, right) in zip(rows, axes, strict=True):
         _state(left, curves[name], component, results, times)
         _control(right, curves[name], component, results, times)
@@ -53,7 +54,11 @@ def build(results: Results, selection: Selection) -> tuple[Figure, pd.DataFrame]
     for ax in axes[0]:
         top = ax.secondary_xaxis("top", functions=_scaling(1.0 / math.tau))
         top.set_xlabel(f"Time ({results.period_name})")
-    return figure, _table(curves)
+    return figure, table_of(curves)
+
+
+def _points(results: Results) -> int:
+    return max(_POINTS, round(_POINTS_IN_PERIOD * results.horizon_periods))
 
 
 def _end(results: Results, curves: Sequence[Curve]) -> float:
@@ -137,15 +142,3 @@ def _scaling(factor: float) -> tuple[Callable[[Any], Any], Callable[[Any], Any]]
 
 def _peak(curves: Sequence[Curve], column: str) -> float:
     return max(float(np.abs(curve.values(column, curve.times)).max()) for curve in curves)
-
-
-def _table(curves: dict[str, list[Curve]]) -> pd.DataFrame:
-    parts = []
-    for initial_condition, pair in curves.items():
-        for curve in pair:
-            part = curve.samples.drop(columns="run").reset_index(drop=True)
-            part.insert(1, "periods", curve.times / math.tau)
-            part.insert(0, "kind", curve.kind)
-            part.insert(0, "initial_condition", initial_condition)
-            parts.append(part)
-    return pd.concat(parts, ignore_index=True)

@@ -51,6 +51,8 @@ class Optima:
         design_variables: their columns, in the order of the tables.
         slices: the design variables for each combination of whose values an optimum is selected.
         baseline: values of design variables that the points of kind ``baseline`` have.
+        any_baseline: whether a baseline that is one point only counts even if it is no candidate: free motion that does
+            not stay bounded is what control is compared with.
     """
 
     def __init__(
@@ -59,7 +61,9 @@ class Optima:
         design_variables: Sequence[str],
         slices: Sequence[str] = (),
         baseline: Mapping[str, float] | None = None,
+        any_baseline: bool = False,
     ) -> None:
+        self._any_baseline = any_baseline
         self._objectives = objectives
         self._design_variables = tuple(design_variables)
         self._slices = tuple(slices)
@@ -75,7 +79,7 @@ class Optima:
         for objective, factors in self._objectives.items():
             allowed = candidates(rows, objective, factors)
             for name in present:
-                self._add(rows, objective, name, allowed & (names == name))
+                self._add(rows, objective, name, names == name, allowed & (names == name))
 
     def rows(self) -> list[dict[str, Any]]:
         """Return the optima: `kind`, `slice`, `objective_name`, then the columns of the rows.
@@ -95,11 +99,14 @@ class Optima:
         found = [(key[3], row) for key, (_, row) in self._best.items() if key[:3] == (objective, name, kind)]
         yield from sorted(found, key=lambda item: item[0])
 
-    def _add(self, rows: Rows, objective: str, name: str, allowed: Booleans) -> None:
+    def _add(self, rows: Rows, objective: str, name: str, present: Booleans, allowed: Booleans) -> None:
         self._offer(rows, allowed, (objective, name, "overall", ()))
         if self._baseline:
             matching = np.logical_and.reduce([rows[column] == value for column, value in self._baseline.items()])
             self._offer(rows, allowed & matching, (objective, name, "baseline", ()))
+            here = present & matching & (rows["status"] != "failed")
+            if self._any_baseline and np.count_nonzero(here) == 1 and not np.any(allowed & here):
+                self._offer(rows, here, (objective, name, "baseline", ()))
         if self._slices:
             table = np.stack([rows[column] for column in self._slices], axis=-1)
             for values in np.unique(table[allowed], axis=0):
@@ -110,7 +117,7 @@ class Optima:
         (where,) = np.nonzero(allowed)
         if not where.size:
             return
-        values = rows[f"objective_{place[0]}"][where]
+        values = np.where(np.isnan(values := rows[f"objective_{place[0]}"][where]), np.inf, values)
         lowest = where[values == values.min()]
         tied = {column: array[lowest] for column, array in rows.items()}
         found = ranks(tied, place[0], self._objectives[place[0]], self._design_variables)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from fracctl.config.build import build_checked
@@ -29,6 +30,27 @@ GROUPS = (
     "experiment",
 )
 
+OF_EXPERIMENTS = {
+    "libration": [
+        *("plant=libration", "controller=delayed_feedback", "initial_condition=tumbling", "solver=method_of_steps"),
+        *("evaluation=delayed", "measures=libration", "objectives=periodicity"),
+        *("survey=gains_delayed", "survey=controlled_or_free", "survey=free_motion"),
+    ],
+    "ellipsoid": [
+        *("plant=rotating_ellipsoid", "controller=eros_wide", "controller=eros_near", "measures=orbit"),
+        "controller=windowed_regulator",
+        *(f"initial_condition={name}" for name in catalogue().options("initial_condition") if name.startswith("rho_")),
+    ],
+    "libration_adaptive": ["controller=adaptive_delay", "survey=adapted_or_not", "measures=adaptive"],
+    "ellipsoid_free": ["measures=free_orbit", "objectives=distance"],
+    "formation": [
+        *("plant=relative_motion", "controller=delayed_lqr", "measures=formation", "objectives=drift"),
+        *("survey=weights_delayed", "measures=formation_perturbed", "plant=perturbed_relative_motion"),
+        *(f"initial_condition={name}" for name in catalogue().options("initial_condition") if "formation" in name),
+    ],
+}
+"""Options under delayed feedback, by an experiment that has all else they need."""
+
 COMPANIONS = {
     "plant=hcw": ["controller=pd_alpha_full"],
     "plant=hcw_in_plane": ["controller=pd_alpha_in_plane"],
@@ -50,6 +72,7 @@ COMPANIONS = {
     "evaluation=comparison": ["survey=comparison"],
     "evaluation=comparison_in_plane": ["plant=hcw_in_plane", "controller=pd_in_plane", "survey=comparison"],
     "survey=comparison": ["evaluation=comparison"],
+    **{option: [f"experiment={name}"] for name, options in OF_EXPERIMENTS.items() for option in options},
     "figures=paper_2_to_5": ["initial_condition=[ic1,ic2,ic3]", "survey=out_of_plane"],
 }
 """What an option needs beside it."""
@@ -85,6 +108,25 @@ TINY_SEARCH = [
     "survey.starts=1",
     "scheduler=serial",
 ]
+DELAYED = {
+    "libration": 2,
+    "libration_onset": 1,
+    "libration_window": 4,
+    "libration_adaptive": 2,
+    "ellipsoid": 2,
+    "ellipsoid_free": 1,
+    "ellipsoid_near": 2,
+    "ellipsoid_regulator": 2,
+    "formation": 2,
+    "formation_eccentric": 2,
+    "formation_perturbed": 2,
+    "formation_weights": 2,
+}
+"""Experiments under delayed feedback, with their number of points on a tiny budget."""
+TINY_DELAYED = {
+    "libration_window": ["survey.axes.gain_1_2=[0.2,0.3]", "survey.axes.recall=[0.0,0.3]"],
+    "formation_weights": ["survey.axes.beta=[100.0,1000.0]"],
+}
 FIXED = {"inplane_decoupled": 1, "inplane_lqr": 1, "inplane_published": 2}
 """Experiments of so few design points that they need no budget, with their number."""
 
@@ -137,7 +179,21 @@ def test_a_search_runs_on_a_tiny_budget(name: str, tmp_path: Path) -> None:
     assert {path.stem for path in (result.run_directory / "figures").glob("*.pdf")} == set(config.figures)
 
 
-@pytest.mark.parametrize("name", sorted({*EXPERIMENTS} - {*CONTINUATIONS} - {*SEARCHES} - {*COMPARISONS}))
+@pytest.mark.parametrize("name", DELAYED)
+def test_an_experiment_under_delayed_feedback_runs_on_a_tiny_budget(name: str, tmp_path: Path) -> None:
+    budget = ["horizon_periods=3", "solver.steps=40", *TINY_DELAYED.get(name, [])]
+    config = compose([f"experiment={name}", *budget, f"output_dir={tmp_path}"])
+    result = execute(config)
+    assert result.summary["status"] == "finished"
+    assert len(result.evaluations) == DELAYED[name] * len(config.initial_condition)
+    assert np.isfinite(result.evaluations["error_estimate"]).all()
+    assert {path.stem for path in (result.run_directory / "figures").glob("*.pdf")} == set(config.figures)
+
+
+OTHERS = {*CONTINUATIONS, *SEARCHES, *COMPARISONS, *DELAYED}
+
+
+@pytest.mark.parametrize("name", sorted({*EXPERIMENTS} - OTHERS))
 def test_an_experiment_runs_on_a_tiny_budget(name: str, tmp_path: Path) -> None:
     budget = [] if name in FIXED else [*TINY, *TINY_SETTINGS.get(name, [])]
     config = compose([f"experiment={name}", *budget, f"output_dir={tmp_path}"])
