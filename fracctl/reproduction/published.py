@@ -14,8 +14,17 @@ from fracctl.errors import ConfigurationError, suggestion
 
 REPRODUCED, NOT_REPRODUCED, NOT_DECIDABLE = WORDS = ("reproduced", "not_reproduced", "not_decidable")
 
-UNITS: Mapping[str, float] = {"1": 1.0, "1e-3": 1e-3, "%": 0.01, "T_orb": 2.0 * math.pi}
-"""One unit of a printed number, dimensionless: ``1e-3`` heads a column "× 10⁻³", T_orb is the chief's period."""
+UNITS: Mapping[str, float] = {
+    "1": 1.0,
+    "1e-3": 1e-3,
+    "%": 0.01,
+    "T_orb": 2.0 * math.pi,
+    "km": 1.0,
+    "1e-6 km": 1e-6,
+    "1e-8 km": 1e-8,
+    "m/s": 1.0,
+}
+"""One unit of a printed number in that of its column: ``1e-3`` heads a column "× 10⁻³", T_orb is the chief's period."""
 
 _COLUMNS = ("id", "place", "quantity", "unit", "published", "tolerance", "expected", "reason")
 _PRINTED = re.compile(r"(?:([<>]) )?(-?\d+(?:\.\d+)?)")
