@@ -9,6 +9,7 @@ from decimal import Decimal
 from pathlib import Path
 
 from fracctl.config.compose import compose
+from fracctl.config.schemas import RunConfig
 from fracctl.errors import RunError
 from fracctl.execution.executors import Executors
 from fracctl.execution.progress import Progress
@@ -98,26 +99,22 @@ def reproduce(
         RunError: a run failed, or some of its points did.
     """
     wanted = suite.sections[section]
-    drawn_once = [] if any(word.startswith("figures=") for word in overrides) else ["figures=[]"]
-    settings: dict[str, Sequence[str]] = {
-        SAMPLED: [*wanted.sampling, *drawn_once] if wanted.sampling else [],
-        EXACT: [],
-    }
+    settings: dict[str, Sequence[str]] = {SAMPLED: wanted.sampling, EXACT: ()}
     runs: dict[str, dict[str, RunResult]] = {sampling: {} for sampling in SAMPLINGS}
     for sampling, words in settings.items():
         for name in wanted.experiments:
             display = progress(f"{name}, {sampling}") if progress else None
-            runs[sampling][name] = _run(name, [*words, *overrides], display, executors)
+            config = compose([f"experiment={name}", *words, *overrides])
+            drawn = config.model_copy(update={"figures": {}}) if words else config
+            runs[sampling][name] = _run(name, drawn, display, executors)
     sampled, exact = (_optima(wanted, runs[sampling]) for sampling in SAMPLINGS)
     rows = tuple(_row(published, recipe, sampled, exact) for published, recipe in suite.rows(section))
     output = runs[EXACT][wanted.experiment].run_directory.parents[1]
     return Reproduction(suite.name, section, wanted.title, rows, runs, output / "reproduce" / suite.name / section)
 
 
-def _run(
-    experiment: str, overrides: Sequence[str], progress: Progress | None, executors: Executors | None
-) -> RunResult:
-    result = execute(compose([f"experiment={experiment}", *overrides]), progress=progress, executors=executors)
+def _run(experiment: str, config: RunConfig, progress: Progress | None, executors: Executors | None) -> RunResult:
+    result = execute(config, progress=progress, executors=executors)
     if error := result.summary.get("error"):
         raise RunError(f"{experiment}: {error}")
     return result

@@ -71,7 +71,7 @@ def test_all_errors_come_at_once() -> None:
         (["controller.k_p_w='1'"], "controller.k_p_w = 1: must be a number"),
         (["controller.k_p_w=null"], "controller.k_p_w = null: must be a number"),
         (["controller.type=pdx"], f"controller.type = pdx: must be one of {CONTROLLERS}; did you mean 'pd'?"),
-        (["plant.type=moon"], "plant.type = moon: must be one of hcw, hcw_in_plane, hcw_out_of_plane, linear"),
+        (["plant.type=moon"], f"plant.type = moon: must be one of {', '.join(names('plants'))}"),
         (["plant.chief.semi_major_axis_km=-1"], "plant.chief.semi_major_axis_km = -1: must be a positive number"),
         (["plant.chief.mass=1"], ("unknown key 'plant.chief.mass'; allowed: semi_major_axis_km, inclination_deg, "
                                  "gravitational_parameter_km3_s2")),
@@ -149,7 +149,7 @@ def test_an_initial_condition_that_moves_nothing() -> None:
 
 def test_keys_are_not_blamed_on_a_plant_that_is_wrong_itself() -> None:
     assert said("plant.type=moon", "controller.alpha_w=0.9") == [
-        "plant.type = moon: must be one of hcw, hcw_in_plane, hcw_out_of_plane, linear"
+        f"plant.type = moon: must be one of {', '.join(names('plants'))}"
     ]
 
 

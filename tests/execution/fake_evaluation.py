@@ -18,6 +18,7 @@ from fracctl.evaluation import Conclusion
 from fracctl.loop import ClosedLoop
 from fracctl.plants import LinearPlant
 from fracctl.solvers import Contour
+from fracctl.trajectory import Trajectory
 
 
 class FakeEvaluation:
@@ -43,6 +44,9 @@ class FakeEvaluation:
     plant = LinearPlant(-1.0, components=("w",))
     measures = ()
     solver = Contour()
+    has_poles = True
+    trajectory_samples = 2001
+    sampled_columns = ("w", "w_dot", "control_w")
 
     def __init__(self, data: Mapping[str, Any]) -> None:
         self.initial_conditions = {name: np.ones(2) for name in data.get("initial_conditions", ["one", "two"])}
@@ -95,6 +99,9 @@ class FakeEvaluation:
 
     def loop(self, design: Mapping[str, float]) -> ClosedLoop:
         return ClosedLoop(self.plant, PDAlpha(design["k_p_w"], design["k_d_w"], design["alpha_w"]))
+
+    def sampled(self, trajectory: Trajectory, times: np.ndarray) -> dict[str, np.ndarray]:
+        return dict(zip(self.sampled_columns, np.hstack([trajectory(times), trajectory.control(times)]).T, strict=True))
 
     def conclude(self, parts: Iterable[Mapping[str, Any]]) -> Conclusion:
         return Conclusion()
