@@ -15,7 +15,7 @@ from fracctl.comparison.findings import findings
 from fracctl.comparison.laws import LARGEST_GAIN
 from fracctl.comparison.problems import Problem, settling_time_within
 from fracctl.comparison.robustness import AXES, HORIZON, INTERIOR, WORST
-from fracctl.comparison.searches import GRID, POLISHED, SEARCHED
+from fracctl.comparison.searches import GRID, ONWARD, SEARCHED
 from fracctl.comparison.selection import Selection
 from fracctl.comparison.statistics import Ratio, paired_ratio, verdict
 from fracctl.evaluation import Conclusion
@@ -77,7 +77,7 @@ class _Table:
             record = self._keys(condition, problem, name) | {"verdict": word} | self._point(found[name], problem)
             record |= {"ratio_to_reference": _ratio(values[name], values[reference])}
             record |= _paired(paired) | self._effort_spent(name, condition, problem, starts[name])
-            record |= self._studied(name, condition, problem) | self._parameters(found[name])
+            record |= self._studied(name, condition, problem, found[name]) | self._parameters(name, found[name])
             records.append(record)
             if found[name] is not None:
                 self.best.append(dict(found[name] or {}))
@@ -108,6 +108,7 @@ class _Table:
             "peak_acceleration_mm_per_s2": float(row.get(PeakAcceleration.name, math.nan)) * self._acceleration,
             LARGEST_GAIN: float(row.get(LARGEST_GAIN, math.nan)),
             "found_by": row.get(PART),
+            "found_for": row.get(LAW),
         }
 
     def _effort_spent(self, law: str, condition: str, problem: Problem, starts: Floats) -> dict[str, Any]:
@@ -116,7 +117,7 @@ class _Table:
         own = self._of(law, condition, problem)
         spent = {
             part: int(np.sum(self._rows[EVALUATIONS_SPENT][own & (self._rows[PART] == part)]))
-            for part in (SEARCHED, GRID, POLISHED)
+            for part in (SEARCHED, GRID, ONWARD)
         }
         return {
             "starts": len(starts),
@@ -126,12 +127,12 @@ class _Table:
             "worst_start": spread[2],
             "search_evaluations": spent[SEARCHED],
             "grid_evaluations": spent[GRID],
-            "polish_evaluations": spent[POLISHED],
+            "onward_evaluations": spent[ONWARD],
         }
 
-    def _studied(self, law: str, condition: str, problem: Problem) -> dict[str, Any]:
+    def _studied(self, law: str, condition: str, problem: Problem, row: Mapping[str, Any] | None) -> dict[str, Any]:
         """Return the objective over other horizons, the worst ones nearby, and the bound for this point."""
-        own = self._of(law, condition, problem)
+        own = self._of(law if row is None else row[LAW], condition, problem)
 
         def value(part: str, column: str = "objective", also: Any = True) -> float:
             places = np.flatnonzero(own & (self._rows[PART] == part) & also)
@@ -147,9 +148,16 @@ class _Table:
         found["worst_found_nearby"] = value(WORST)
         return found | {"least_delta_v_m_per_s": value(BOUND, "control_effort") * self._speed}
 
-    def _parameters(self, row: Mapping[str, Any] | None) -> dict[str, Any]:
-        names = self._comparison.design_variables
-        return {name: math.nan if row is None else float(row[name]) for name in names}
+    def _parameters(self, law: str, row: Mapping[str, Any] | None) -> dict[str, Any]:
+        """Return the parameters of a law, NaN for those of others; without a lag it is 0."""
+        comparison = self._comparison
+        if row is None:
+            found: Mapping[str, Any] = {}
+        elif row[LAW] == law:
+            found = row
+        else:
+            found = comparison.law_of(law).point_of(comparison.law_of(row[LAW]), row, 0.0)
+        return {name: float(found.get(name, math.nan)) for name in comparison.design_variables}
 
     def _bound(self, condition: str, problem: Problem, like: Mapping[str, Any]) -> dict[str, Any]:
         """Return the row of the bound, at the time and within the peak of the best law."""
@@ -160,7 +168,9 @@ class _Table:
             for name, value in like.items()
         }
         record = (
-            empty | self._keys(condition, problem, OPEN_LOOP) | {"verdict": NO_LAW, "stable": None, "found_by": None}
+            empty
+            | self._keys(condition, problem, OPEN_LOOP)
+            | {"verdict": NO_LAW, "stable": None, "found_by": None, "found_for": None}
         )
         if row is None:
             return record

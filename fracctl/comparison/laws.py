@@ -142,11 +142,11 @@ class Law:
         columns = [np.log10(rows[p.name]) if p.kind in LOGARITHMIC else rows[p.name] for p in self.varied]
         return np.stack([np.asarray(column, dtype=np.float64) for column in columns], axis=1)
 
-    def point_of(self, inner: Law, row: Mapping[str, float], least_time: float) -> dict[str, float]:
-        """Return the parameters with which this law is one that it extends, at a row of that; lags are the least."""
-        neutral = {"order": 1.0, "gain": 0.0, "time": least_time}
+    def point_of(self, other: Law, row: Mapping[str, float], lag: float) -> dict[str, float]:
+        """Return the parameters of this law at a row of another one: where that has none, orders are 1, gains 0."""
+        neutral = {"order": 1.0, "gain": 0.0, "time": lag}
         simple = {name: neutral[parameter.kind] for name, parameter in self.parameters.items()}
-        return simple | {name: float(row[name]) for name in inner.by_gains.design_variables}
+        return simple | {name: float(row[name]) for name in other.by_gains.design_variables if name in simple}
 
     def design(self, points: Floats) -> dict[str, Floats]:
         """Return points (b, n) in the coordinates of searches as a design of `searched`."""
@@ -154,7 +154,7 @@ class Law:
 
 
 def extends(outer: Law, inner: Law) -> bool:
-    """Return whether a law comes down to another one where further orders are 1, further gains 0, and lags small."""
+    """Return whether a law comes down to another one where further orders are 1, and further gains and lags 0."""
     own, other = outer.evaluation.design_variables, inner.by_gains.design_variables
     if outer.evaluation.weighed_by is not None or outer.name == inner.name or not set(other) <= set(own):
         return False

@@ -1,4 +1,4 @@
-"""The searches of a comparison, as workers run them: from seeds, over a grid, and onwards from the best of either."""
+"""The searches of a comparison, as workers run them: over a grid, from seeds, and onwards from the best of either."""
 
 from __future__ import annotations
 
@@ -8,92 +8,138 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fracctl.arrays import Array, Floats, joined
-from fracctl.comparison.descent import descend
 from fracctl.comparison.evaluation import PART, ComparisonEvaluation, sound
 from fracctl.comparison.laws import Law, LawEvaluation
+from fracctl.comparison.populations import adapt, evolve
 from fracctl.comparison.problems import Problem
 from fracctl.evaluation import Evaluation
 from fracctl.measures.final_distance import FinalDistance
 from fracctl.surveys.base import EVALUATIONS_SPENT, POINT, SEARCHED_FOR
-from fracctl.surveys.search_algorithms import DIFFERENTIAL_EVOLUTION, Optimiser
 from fracctl.surveys.search_run import Variable, latin_hypercube, penalties
 
-START, SEARCHED, GRID, POLISHED = "start", "search", "grid", "polish"
+START, SEARCHED, GRID, ONWARD = "start", "search", "grid", "onward"
 """Parts of the study that rows of searches belong to; a start counts for nothing but its block."""
+_DECIMALS = 12
+"""Points are rounded, so that the same one may be met again."""
 
 
 @dataclass(frozen=True)
 class Evolution:
-    """Differential evolution for some problems of one limit, from several starts.
+    """Searches of a law for all problems of an initial condition, from several starts: differential evolution, CMA-ES.
 
-    Each start of each problem has a population of its own. The seeds do not depend on the law, so starts of different
-    laws are pairs. Points that are not admissible are told apart as in `fracctl.surveys.search_run.SeededSearch`.
-    A start's best point for one problem may come from the population of another one. Where a start has found nothing
-    admissible, its row is the point that came nearest to it.
+    Each start of each problem has a population of its own. Within a start every problem takes the best of all points
+    that any population looks at; starts learn nothing of each other. The first points do not depend on the law, so
+    starts of different laws are pairs. Points that are not admissible are told apart as in
+    `fracctl.surveys.search_run.SeededSearch`; where a start has found nothing admissible, its row is the point that
+    came nearest to it.
     """
 
     law: str
     initial_condition: str
     problems: tuple[Problem, ...]
-    """They have the same limit."""
-    starts: tuple[int, ...]
-    """Numbers of the starts."""
+    starts: tuple[int | None, ...]
+    """Numbers of the starts; None for the one that knows the grids and all others."""
+    part: str
+    """Of the study."""
     seeds: tuple[tuple[int, ...], ...]
     """Entropy of each problem of the first start, of the second, …"""
+    places: tuple[int, ...]
+    """Place in `starts` of each point that the search is given."""
     population: int
     """Points of a generation."""
     evaluations: int
-    """Of each population: whole generations."""
+    """Of each population by differential evolution: whole generations."""
+    polish: int
+    """Of each population by CMA-ES from the best point: whole generations."""
 
-    def __call__(self, evaluation: Evaluation, starts: Mapping[str, Floats]) -> dict[str, Array]:  # noqa: ARG002
-        """Return the first points, which follow from the seeds, then the best ones of each start and problem."""
+    def __call__(self, evaluation: Evaluation, starts: Mapping[str, Floats]) -> dict[str, Array]:
+        """Return the given points, then the best ones of each start and problem.
+
+        A population begins with the best of the points that its start is given, put into its box, and fills the rest,
+        a quarter at least, from its seed.
+        """
         comparison = of(evaluation)
-        law = comparison.law_of(self.law, [problem.threshold_m for problem in self.problems])
-        searched = _watched(law.searched, self.initial_condition)
-        count, each = len(self.seeds), len(self.problems)
-        optimisers = [self._optimiser(comparison, law, seed) for seed in self.seeds]
-        first = self.first_points(comparison, law)
-        points, values = first.copy(), np.full(count, np.inf)
-        generations = self.evaluations // self.population
-        for _ in range(generations):
-            asked = np.concatenate([optimiser.ask() for optimiser in optimisers])
-            rows = searched(law.design(asked))
-            told = np.stack([_told(comparison, rows, problem) for problem in self.problems])
-            parts = np.arange(len(asked)).reshape(count, -1)
-            for number, optimiser in enumerate(optimisers):
-                optimiser.tell(told[number % each, parts[number], None])
-                together = parts[number - number % each : number - number % each + each].ravel()
-                best = together[np.argmin(told[number % each, together])]
-                if told[number % each, best] < values[number]:
-                    points[number], values[number] = asked[best], told[number % each, best]
-        every, spent = comparison.law_of(self.law), generations * self.population
-        return joined(
-            [
-                self._rows(comparison, every, first, START) | {EVALUATIONS_SPENT: np.ones(count, dtype=np.int64)},
-                self._rows(comparison, every, points, SEARCHED) | {EVALUATIONS_SPENT: np.full(count, spent)},
-            ]
-        )
+        law = comparison.law_of(self.law)
+        known = _Known(comparison, law, self.initial_condition, self.problems, len(self.starts))
+        given = known.within(law.coordinates(starts), self.places)
+        found = known(given)
+        best = np.argsort(found, axis=1, kind="stable")[:, : 3 * self.population // 4, None]
+        drawn = known.unit(self.first_points(comparison, law))
+        points = np.concatenate([np.take_along_axis(given, best, axis=1), drawn[:, best.shape[1] :]], axis=1)
+        random = np.random.default_rng(list(self.seeds[0]))
+        spent = given.shape[1] + evolve(known, points, self.evaluations, random) + adapt(known, self.polish, random)
+        begin = table_rows(comparison, law, self.initial_condition, law.coordinates(starts), self._like(), START)
+        begin |= {name: starts[name] for name in law.evaluation.design_variables}
+        problems = list(self.problems) * len(self.starts)
+        end = table_rows(comparison, law, self.initial_condition, known.natural(known.points), problems, self.part)
+        numbers = [np.nan if start is None else float(start) for start in self.starts]
+        end |= {"start": np.repeat(numbers, len(self.problems))}
+        return joined([begin, end]) | {EVALUATIONS_SPENT: np.repeat([1, spent], [len(self.places), len(problems)])}
 
     def first_points(self, comparison: ComparisonEvaluation, law: Law) -> Floats:
-        """Return the first point of each population, (s p, n)."""
-        return np.stack([self._sample(comparison, law, seed)[0] for seed in self.seeds])
+        """Return a Latin hypercube sample of the box of each start and problem, (s p, population, n).
 
-    def _sample(self, comparison: ComparisonEvaluation, law: Law, seed: tuple[int, ...]) -> Floats:
-        """Return a first generation; searches of different laws share the values of the variables they share."""
-        return latin_hypercube(self._box(comparison, law), self.population, seed)
+        Searches of different laws share the values of the variables they share.
+        """
+        boxes = [comparison.box(law, comparison.largest_gain(p)) for p in self.problems] * len(self.starts)
+        samples = zip(boxes, self.seeds, strict=True)
+        return np.stack([latin_hypercube(box, self.population, seed) for box, seed in samples])
 
-    def _box(self, comparison: ComparisonEvaluation, law: Law) -> tuple[Variable, ...]:
-        return comparison.box(law, comparison.largest_gain(self.problems[0]))
+    def _like(self) -> list[Problem]:
+        return [self.problems[0]] * len(self.places)
 
-    def _optimiser(self, comparison: ComparisonEvaluation, law: Law, seed: tuple[int, ...]) -> Optimiser:
-        lower, upper = edges(self._box(comparison, law))
-        number = int(np.random.SeedSequence(seed).generate_state(1)[0])
-        return Optimiser(DIFFERENTIAL_EVOLUTION, self._sample(comparison, law, seed), lower, upper, 1, number)
 
-    def _rows(self, comparison: ComparisonEvaluation, law: Law, points: Floats, part: str) -> dict[str, Array]:
-        problems = list(self.problems) * len(self.starts)
-        starts = np.repeat(self.starts, len(self.problems)).astype(np.float64)
-        return table_rows(comparison, law, self.initial_condition, points, problems, part, starts)
+class _Known:
+    """The best points that each start knows for each problem; see `fracctl.comparison.populations.Shared`."""
+
+    def __init__(
+        self, comparison: ComparisonEvaluation, law: Law, condition: str, problems: Sequence[Problem], starts: int
+    ) -> None:
+        self._comparison, self._law, self._problems, self._starts = comparison, law, problems, starts
+        self._searched = _watched(law.searched, condition)
+        limits = [edges(comparison.box(law, comparison.largest_gain(problem))) for problem in problems]
+        self._lower, self._upper = (np.tile(np.stack(ends), (starts, 1)) for ends in zip(*limits, strict=True))
+        self.points, self.values = np.zeros_like(self._lower), np.full(len(self._lower), np.inf)
+
+    def __call__(self, points: Floats) -> Floats:
+        """Return what each search minimises at its points (m, p, n) of the unit box, (m, p)."""
+        count, size, n = points.shape
+        each = len(self._problems)
+        natural = self.natural(points).reshape(-1, n)
+        rows = self._searched(self._law.design(natural))
+        told = _told(self._comparison, rows, self._problems).reshape(each, self._starts, each * size)
+        place = np.argmin(told, axis=2)
+        found = np.take_along_axis(told, place[..., None], axis=2)[..., 0].T.ravel()
+        better = found < self.values
+        reached = natural.reshape(self._starts, each * size, n)[np.arange(self._starts)[:, None], place.T]
+        self.values = np.where(better, found, self.values)
+        self.points = np.where(better[:, None], self.unit(reached.reshape(count, n)), self.points)
+        own: Floats = told.reshape(each, self._starts, each, size)[np.arange(each), :, np.arange(each)]
+        return own.transpose(1, 0, 2).reshape(count, size)
+
+    def within(self, points: Floats, places: Sequence[int]) -> Floats:
+        """Return all points (b, n) of each start as points of the unit boxes of its problems, (m, c, n).
+
+        Starts that have fewer of them than others hold the first one several times.
+        """
+        of_start = [np.flatnonzero(np.equal(places, start)) for start in range(self._starts)]
+        most = max(len(own) for own in of_start)
+        chosen = np.stack([np.append(own, np.full(most - len(own), own[0])) for own in of_start])
+        return self.unit(np.repeat(points[chosen], len(self._problems), axis=0))
+
+    def natural(self, points: Floats) -> Floats:
+        """Return points of the unit boxes, (m, n) or (m, p, n), in the coordinates of searches."""
+        lower, upper = self._ends(points)
+        return np.clip(np.round(lower + points * (upper - lower), _DECIMALS), lower, upper)
+
+    def unit(self, points: Floats) -> Floats:
+        """Return points, (m, n) or (m, p, n), in the unit boxes; those outside are put on the edge."""
+        lower, upper = self._ends(points)
+        return np.clip((points - lower) / (upper - lower), 0.0, 1.0)
+
+    def _ends(self, points: Floats) -> tuple[Floats, Floats]:
+        each = (slice(None), *[None] * (points.ndim - 2))
+        return self._lower[each], self._upper[each]
 
 
 @dataclass(frozen=True)
@@ -112,7 +158,7 @@ class GridSearch:
         rows = law.searched(law.design(points))
         problems = list(comparison.problems)
         first = next(iter(comparison.initial_conditions))
-        start = table_rows(comparison, law, first, points[:1], problems[:1], START, np.array([np.nan]))
+        start = table_rows(comparison, law, first, points[:1], problems[:1], START)
         parts = [start | {EVALUATIONS_SPENT: np.ones(1, dtype=np.int64)}]
         for place in range(len(comparison.initial_conditions)):
             own = {name: values[place * len(points) : (place + 1) * len(points)] for name, values in rows.items()}
@@ -128,44 +174,6 @@ class GridSearch:
         return joined(parts)
 
 
-@dataclass(frozen=True)
-class Polish:
-    """Pattern searches for several problems of one initial condition, which share all points they look at."""
-
-    law: str
-    initial_condition: str
-    problems: tuple[Problem, ...]
-    """Of each point."""
-    start: int | None
-    """Number of the start that the points come from; None for the grid."""
-    evaluations: int
-    """At most, of each problem."""
-    seed: tuple[int, ...]
-
-    def __call__(self, evaluation: Evaluation, starts: Mapping[str, Floats]) -> dict[str, Array]:
-        """Return the points, then where each has led."""
-        comparison = of(evaluation)
-        law = comparison.law_of(self.law)
-        searched = _watched(law.searched, self.initial_condition)
-        points = law.coordinates(starts)
-        known = searched(law.design(points))
-        number = np.full(len(points), np.nan if self.start is None else float(self.start))
-        begin = table_rows(comparison, law, self.initial_condition, points, self.problems, START, number)
-        begin |= {name: starts[name] for name in law.evaluation.design_variables}
-        values = np.array([_told(comparison, known, problem)[i] for i, problem in enumerate(self.problems)])
-        limits = [edges(comparison.box(law, comparison.largest_gain(problem))) for problem in self.problems]
-        box = np.stack([lower for lower, _ in limits]), np.stack([upper for _, upper in limits])
-
-        def value(around: Floats) -> Floats:
-            rows = searched(law.design(around.reshape(-1, around.shape[2])))
-            return np.stack([_told(comparison, rows, problem) for problem in self.problems])
-
-        reached = descend(value, points, values, box, self.evaluations, self.seed)
-        end = table_rows(comparison, law, self.initial_condition, reached.points, self.problems, POLISHED, number)
-        spent = np.repeat([1, reached.evaluations], len(points))
-        return joined([begin, end]) | {EVALUATIONS_SPENT: spent}
-
-
 def table_rows(
     comparison: ComparisonEvaluation,
     law: Law,
@@ -173,11 +181,10 @@ def table_rows(
     points: Floats,
     problems: Sequence[Problem],
     part: str,
-    starts: Floats,
 ) -> dict[str, Array]:
     """Return table rows of points (p, n) in the coordinates of searches, one for each problem."""
     rows = _from(law.searched, initial_condition)(law.design(points))
-    table = comparison.table_rows(rows, law.name, problems, start=starts, **{PART: part})
+    table = comparison.table_rows(rows, law.name, problems, **{PART: part})
     return table | {POINT: np.arange(len(points)), SEARCHED_FOR: np.full(len(points), None, dtype=object)}
 
 
@@ -192,13 +199,18 @@ def of(evaluation: Evaluation) -> ComparisonEvaluation:
     return evaluation
 
 
-def _told(comparison: ComparisonEvaluation, rows: Mapping[str, Array], problem: Problem) -> Floats:
-    """Return what a search for a problem minimises, finite for every row."""
-    values = comparison.admissible(rows, problem)
-    settled = np.isfinite(rows[f"objective_{problem.objective}"])
-    excess = np.where(sound(rows) & settled, comparison.excess(rows, problem), 0.0)
-    distance = np.where(sound(rows) & ~settled, rows[FinalDistance.name], np.inf)
-    return np.where(np.isfinite(values), values, penalties(excess, distance))
+def _told(comparison: ComparisonEvaluation, rows: Mapping[str, Array], problems: Sequence[Problem]) -> Floats:
+    """Return what a search for each problem minimises, finite for every row, (p, n)."""
+    solved = sound(rows)
+    told = []
+    for problem in problems:
+        values = np.asarray(rows[f"objective_{problem.objective}"], dtype=np.float64)
+        settled = np.isfinite(values)
+        excess = np.where(solved & settled, comparison.excess(rows, problem), 0.0)
+        distance = np.where(solved & ~settled, rows[FinalDistance.name], np.inf)
+        admissible = solved & settled & (excess <= 0.0)
+        told.append(np.where(admissible, values, penalties(excess, distance)))
+    return np.stack(told)
 
 
 def _watched(evaluation: LawEvaluation, initial_condition: str) -> LawEvaluation:

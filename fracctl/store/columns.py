@@ -19,7 +19,7 @@ SIGMA, W = "sigma", "w"
 
 TEXT = (
     *("variable", "initial_condition", "status", REASON, "kind", "objective_name", "solver", SEARCHED_FOR),
-    *("law", "part", "limit", "verdict", "found_by"),
+    *("law", "part", "limit", "verdict", "found_by", "found_for"),
 )
 """Columns that hold words."""
 _WHOLE = (POINT, "run", EVALUATIONS_SPENT, "principal_poles", "denominator")

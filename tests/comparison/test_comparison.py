@@ -27,7 +27,7 @@ from tests.execution.test_perform import Watch, tables_of
 FEW = [
     *("survey.starts=2", "survey.evaluations=128", "survey.population=16", "survey.polish=48", "survey.interior=4"),
     *("survey.grid.gains=9", "survey.grid.orders=3", "survey.grid.times=4", "survey.grid.weights=9"),
-    *("survey.leaders=1", "evaluation.gain_limits=[2]", "evaluation.peak_limits_mm_per_s2=[8]"),
+    *("survey.rounds=2", "evaluation.gain_limits=[2]", "evaluation.peak_limits_mm_per_s2=[8]"),
     *("evaluation.thresholds_m=[100,10]", "initial_condition=[ic1]", "solver.cross_check=0.01"),
 ]
 LAWS = ["pd", "pd_alpha", "pd_lag", "pid", "lqr"]
@@ -131,14 +131,15 @@ def test_starts_of_different_laws_are_pairs() -> None:
     for search in searches:
         assert isinstance(search, Evolution)
         law = evaluation.law_of(search.law)
-        points = law.searched.natural(law.design(search.first_points(evaluation, law)))
+        sample = search.first_points(evaluation, law)
+        points = law.searched.natural(law.design(sample.reshape(-1, sample.shape[2])))
         if "k_p_w" in points:
             first.setdefault(search.law, []).append(np.stack([points["k_p_w"], points["k_d_w"]]))
     assert set(first) == {"pd", "pd_alpha", "pd_lag", "pid"}
     for points_of in zip(*first.values(), strict=True):
         assert all(np.array_equal(points_of[0], other) for other in points_of)
     budgets = {(s.law, s.evaluations, s.population, len(s.seeds)) for s in searches if isinstance(s, Evolution)}
-    assert {budget[1:] for budget in budgets} == {(128, 16, 4)}
+    assert {budget[1:] for budget in budgets} == {(128, 16, 8)}
 
 
 @pytest.mark.parametrize("law_and_worst", [("pd", 0.90), ("pd_alpha", 0.92)])
