@@ -17,7 +17,7 @@ from fracctl.comparison.problems import Problem, settling_time_within
 from fracctl.comparison.robustness import AXES, HORIZON, INTERIOR, WORST
 from fracctl.comparison.searches import GRID, ONWARD, SEARCHED
 from fracctl.comparison.selection import Selection
-from fracctl.comparison.statistics import Ratio, paired_ratio, verdict
+from fracctl.comparison.statistics import Ratio, best_ratio, paired_ratio, verdict
 from fracctl.evaluation import Conclusion
 from fracctl.measures import PeakAcceleration
 from fracctl.surveys.base import EVALUATIONS_SPENT
@@ -72,10 +72,12 @@ class _Table:
             mine = starts[name] if starts[name].size else np.full_like(starts[reference], np.inf)
             paired = paired_ratio(mine, starts[reference], (place,))
             exact = self._gridded[name], self._gridded[reference]
-            word = verdict(values[name], values[reference], paired, exact=exact)
+            interval = best_ratio(mine, starts[reference], (place,))
+            word = verdict(values[name], values[reference], interval, exact=exact)
             word = NOTHING if found[name] is None else REFERENCE if name == reference else word
             record = self._keys(condition, problem, name) | {"verdict": word} | self._point(found[name], problem)
             record |= {"ratio_to_reference": _ratio(values[name], values[reference])}
+            record |= {"ratio_lower": interval[0], "ratio_upper": interval[1]}
             record |= _paired(paired) | self._effort_spent(name, condition, problem, starts[name])
             record |= self._studied(name, condition, problem, found[name]) | self._parameters(name, found[name])
             records.append(record)

@@ -12,10 +12,10 @@ import numpy as np
 from fracctl.comparison.evaluation import OPEN_LOOP, ComparisonEvaluation
 from fracctl.comparison.problems import MOST_GRID_VARIABLES
 from fracctl.comparison.robustness import HALF_WIDTHS
-from fracctl.comparison.statistics import BETTER, EQUAL, UNDECIDED, WORSE, Ratio, verdict
+from fracctl.comparison.statistics import BETTER, EQUAL, UNDECIDED, WORSE, verdict
 
 Record = Mapping[str, Any]
-_NO_PAIRS = Ratio(0, math.nan, math.nan, math.nan)
+_NO_INTERVAL = (math.nan, math.nan)
 _MOST_NAMED = 6
 """Problems that are named one by one."""
 
@@ -85,7 +85,7 @@ def _against_integer(
             kind: min((_value(laws[name]), name) for name in names)
             for kind, names in (("fractional", fractional), ("integer", integer))
         }
-        word = verdict(best["fractional"][0], best["integer"][0], _NO_PAIRS)
+        word = verdict(best["fractional"][0], best["integer"][0], _NO_INTERVAL)
         words[word] += 1
         if word == BETTER:
             gain = 100.0 * (1.0 - best["fractional"][0] / best["integer"][0])

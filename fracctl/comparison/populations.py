@@ -19,7 +19,7 @@ _EXCHANGED = 4
 """Generations after which populations take what others have found for them."""
 OFFSPRING = 16
 """Points of a generation of CMA-ES."""
-_FIRST_STEP = 0.03
+_FIRST_STEP = 0.05
 """Its first standard deviation, of the width of the box."""
 _STEPS = (1e-9, 1.0)
 _LEAST_VARIANCE = 1e-20
@@ -53,8 +53,10 @@ def evolve(shared: Shared, points: Floats, evaluations: int, random: np.random.G
     """
     count, size, n = points.shape
     everyone = np.arange(count)
+    generations = evaluations // size
+    if not generations:
+        return 0
     values = shared(points)
-    generations: int = evaluations // size
     for generation in range(1, generations):
         best = points[everyone, np.argmin(values, axis=1)][:, None]
         one, other = random.integers(size, size=(2, count, size))
@@ -69,7 +71,7 @@ def evolve(shared: Shared, points: Floats, evaluations: int, random: np.random.G
             (behind,) = np.nonzero(shared.values < values.min(axis=1))
             worst = np.argmax(values[behind], axis=1)
             points[behind, worst], values[behind, worst] = shared.points[behind], shared.values[behind]
-    return generations * size
+    return int(generations * size)
 
 
 def _inside(moved: Floats, base: Floats, random: np.random.Generator) -> Floats:

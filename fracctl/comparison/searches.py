@@ -25,7 +25,7 @@ _DECIMALS = 12
 
 @dataclass(frozen=True)
 class Evolution:
-    """Searches of a law for all problems of an initial condition, from several starts: differential evolution, CMA-ES.
+    """Differential evolution of a law for all problems of an initial condition, from several starts.
 
     Each start of each problem has a population of its own. Within a start every problem takes the best of all points
     that any population looks at; starts learn nothing of each other. The first points do not depend on the law, so
@@ -37,44 +37,31 @@ class Evolution:
     law: str
     initial_condition: str
     problems: tuple[Problem, ...]
-    starts: tuple[int | None, ...]
-    """Numbers of the starts; None for the one that knows the grids and all others."""
-    part: str
-    """Of the study."""
+    starts: tuple[int, ...]
+    """Numbers of the starts."""
     seeds: tuple[tuple[int, ...], ...]
     """Entropy of each problem of the first start, of the second, …"""
-    places: tuple[int, ...]
-    """Place in `starts` of each point that the search is given."""
     population: int
     """Points of a generation."""
     evaluations: int
-    """Of each population by differential evolution: whole generations."""
-    polish: int
-    """Of each population by CMA-ES from the best point: whole generations."""
+    """Of each population: whole generations."""
 
-    def __call__(self, evaluation: Evaluation, starts: Mapping[str, Floats]) -> dict[str, Array]:
-        """Return the given points, then the best ones of each start and problem.
-
-        A population begins with the best of the points that its start is given, put into its box, and fills the rest,
-        a quarter at least, from its seed.
-        """
+    def __call__(self, evaluation: Evaluation, starts: Mapping[str, Floats]) -> dict[str, Array]:  # noqa: ARG002
+        """Return the first points, which follow from the seeds, then the best ones of each start and problem."""
         comparison = of(evaluation)
         law = comparison.law_of(self.law)
         known = _Known(comparison, law, self.initial_condition, self.problems, len(self.starts))
-        given = known.within(law.coordinates(starts), self.places)
-        found = known(given)
-        best = np.argsort(found, axis=1, kind="stable")[:, : 3 * self.population // 4, None]
-        drawn = known.unit(self.first_points(comparison, law))
-        points = np.concatenate([np.take_along_axis(given, best, axis=1), drawn[:, best.shape[1] :]], axis=1)
+        first = self.first_points(comparison, law)
         random = np.random.default_rng(list(self.seeds[0]))
-        spent = given.shape[1] + evolve(known, points, self.evaluations, random) + adapt(known, self.polish, random)
-        begin = table_rows(comparison, law, self.initial_condition, law.coordinates(starts), self._like(), START)
-        begin |= {name: starts[name] for name in law.evaluation.design_variables}
+        spent = evolve(known, known.unit(first), self.evaluations, random)
         problems = list(self.problems) * len(self.starts)
-        end = table_rows(comparison, law, self.initial_condition, known.natural(known.points), problems, self.part)
-        numbers = [np.nan if start is None else float(start) for start in self.starts]
-        end |= {"start": np.repeat(numbers, len(self.problems))}
-        return joined([begin, end]) | {EVALUATIONS_SPENT: np.repeat([1, spent], [len(self.places), len(problems)])}
+        begin = table_rows(comparison, law, self.initial_condition, first[:, 0], problems, START)
+        return joined(
+            [
+                begin | {EVALUATIONS_SPENT: np.ones(len(problems), dtype=np.int64)},
+                known.rows(self.starts, SEARCHED, spent),
+            ]
+        )
 
     def first_points(self, comparison: ComparisonEvaluation, law: Law) -> Floats:
         """Return a Latin hypercube sample of the box of each start and problem, (s p, population, n).
@@ -85,8 +72,40 @@ class Evolution:
         samples = zip(boxes, self.seeds, strict=True)
         return np.stack([latin_hypercube(box, self.population, seed) for box, seed in samples])
 
-    def _like(self) -> list[Problem]:
-        return [self.problems[0]] * len(self.places)
+
+@dataclass(frozen=True)
+class Onward:
+    """Searches of a law by CMA-ES for all problems of an initial condition, from the best of given points.
+
+    What is shared, and what is not, is as in `Evolution`.
+    """
+
+    law: str
+    initial_condition: str
+    problems: tuple[Problem, ...]
+    starts: tuple[int | None, ...]
+    """Numbers of the starts; None for the one that knows the grids and all others."""
+    places: tuple[int, ...]
+    """Place in `starts` of each point that is given; every start has one at least."""
+    evaluations: int
+    """Of each search, besides those of the given points: whole generations."""
+    seed: tuple[int, ...]
+
+    def __call__(self, evaluation: Evaluation, starts: Mapping[str, Floats]) -> dict[str, Array]:
+        """Return the given points, then the best ones of each start and problem."""
+        comparison = of(evaluation)
+        law = comparison.law_of(self.law)
+        known = _Known(comparison, law, self.initial_condition, self.problems, len(self.starts))
+        points = law.coordinates(starts)
+        given = known.within(points, self.places)
+        known(given)
+        spent = given.shape[1] + adapt(known, self.evaluations, np.random.default_rng(list(self.seed)))
+        like = [self.problems[0]] * len(points)
+        begin = table_rows(comparison, law, self.initial_condition, points, like, START)
+        begin |= {name: starts[name] for name in law.evaluation.design_variables}
+        return joined(
+            [begin | {EVALUATIONS_SPENT: np.ones(len(points), dtype=np.int64)}, known.rows(self.starts, ONWARD, spent)]
+        )
 
 
 class _Known:
@@ -96,6 +115,7 @@ class _Known:
         self, comparison: ComparisonEvaluation, law: Law, condition: str, problems: Sequence[Problem], starts: int
     ) -> None:
         self._comparison, self._law, self._problems, self._starts = comparison, law, problems, starts
+        self._condition = condition
         self._searched = _watched(law.searched, condition)
         limits = [edges(comparison.box(law, comparison.largest_gain(problem))) for problem in problems]
         self._lower, self._upper = (np.tile(np.stack(ends), (starts, 1)) for ends in zip(*limits, strict=True))
@@ -126,6 +146,17 @@ class _Known:
         most = max(len(own) for own in of_start)
         chosen = np.stack([np.append(own, np.full(most - len(own), own[0])) for own in of_start])
         return self.unit(np.repeat(points[chosen], len(self._problems), axis=0))
+
+    def rows(self, starts: Sequence[int | None], part: str, spent: int) -> dict[str, Array]:
+        """Return table rows of the best points, with the numbers of their starts."""
+        problems = list(self._problems) * self._starts
+        natural = self.natural(self.points)
+        rows = table_rows(self._comparison, self._law, self._condition, natural, problems, part)
+        numbers = [np.nan if start is None else float(start) for start in starts]
+        return rows | {
+            "start": np.repeat(numbers, len(self._problems)),
+            EVALUATIONS_SPENT: np.full(len(problems), spent),
+        }
 
     def natural(self, points: Floats) -> Floats:
         """Return points of the unit boxes, (m, n) or (m, p, n), in the coordinates of searches."""

@@ -14,7 +14,7 @@ from fracctl.comparison.evaluation import LAW, OPEN_LOOP, PART, ComparisonEvalua
 from fracctl.comparison.laws import Law
 from fracctl.comparison.problems import MOST_GRID_VARIABLES, PEAK, Problem, settling_time_within
 from fracctl.comparison.robustness import Robustness
-from fracctl.comparison.searches import ONWARD, SEARCHED, START, Evolution, GridSearch
+from fracctl.comparison.searches import START, Evolution, GridSearch, Onward
 from fracctl.comparison.selection import Selection
 from fracctl.errors import ArgumentError, UnsupportedError
 from fracctl.evaluation import Evaluation
@@ -45,9 +45,9 @@ class Comparison:
         seed: of the run; that of a search depends on it, the start, the initial condition and the problem, not on
             the law.
         starts: number of searches that differ in nothing but the seed.
-        rounds: after the first search.
-        evaluations: by differential evolution, for each start and problem, first and in every round.
-        polish: by CMA-ES, likewise.
+        evaluations: of the first search by differential evolution, for each start and problem.
+        rounds: after it.
+        polish: of a round by CMA-ES, likewise.
         population: points of a generation.
         grid: number of values of each gain, and of all ``orders``, ``times`` and ``weights``; null for no grids.
         interior: points inside the box around a best point.
@@ -65,9 +65,9 @@ class Comparison:
         evaluation: Evaluation,
         seed: int,
         starts: int = 5,
+        evaluations: int = 4480,
         rounds: int = 3,
-        evaluations: int = 1280,
-        polish: int = 480,
+        polish: int = 640,
         population: int = 64,
         grid: dict[str, int] | None = None,
         interior: int = 64,
@@ -137,27 +137,14 @@ class Comparison:
         for condition, name in itertools.product(comparison.initial_conditions, comparison.laws):
             law = comparison.law_of(name)
             for starts in self._abreast() if self._has_starts(law) else ():
-                places = tuple(np.repeat(np.arange(len(starts)), len(comparison.problems)).tolist())
-                search = self._evolution(name, condition, starts, SEARCHED, 0, places)
-                first = search.first_points(comparison, law)[:, 0]
-                yield law.searched.natural(law.design(first)), search
+                seeds = tuple(_entropy(self._seed, s, condition, str(p)) for s in starts for p in comparison.problems)
+                budget = self._population, self._evaluations
+                search = Evolution(name, condition, comparison.problems, starts, seeds, *budget)
+                yield law.searched.natural(law.design(search.first_points(comparison, law)[:, 0])), search
 
     def _abreast(self) -> list[tuple[int, ...]]:
         numbers = range(self._starts)
         return [tuple(numbers[first : first + _ABREAST]) for first in range(0, self._starts, _ABREAST)]
-
-    def _evolution(
-        self, law: str, condition: str, starts: tuple[int | None, ...], part: str, number: int, places: tuple[int, ...]
-    ) -> Evolution:
-        """Return a search of a round, 0 for the first search."""
-        problems = self._comparison.problems
-        seeds = tuple(
-            _entropy(self._seed, -1 if start is None else start, condition, f"{problem} {number}")
-            for start in starts
-            for problem in problems
-        )
-        budget = self._population, self._evaluations, self._polish
-        return Evolution(law, condition, problems, starts, part, seeds, places, *budget)
 
     def _has_starts(self, law: Law) -> bool:
         return not self._has_grid(law) or law.name == self._comparison.reference
@@ -195,10 +182,11 @@ class Comparison:
                 found = {start: self._known(law, condition, start, selection, rows) for start in group}
                 starts = tuple(start for start in group if found[start])
                 points = [(place, point) for place, start in enumerate(starts) for point in found[start]]
-                if points:
+                if points and self._polish:
                     places = tuple(place for place, _ in points)
                     design = {v: np.array([point[v] for _, point in points]) for v in law.evaluation.design_variables}
-                    yield design, self._evolution(name, condition, starts, ONWARD, number, places)
+                    seed = _entropy(self._seed, -1 if starts[0] is None else starts[0], condition, f"round {number}")
+                    yield design, Onward(name, condition, comparison.problems, starts, places, self._polish, seed)
 
     def _known(
         self, law: Law, condition: str, start: int | None, selection: Selection, rows: Rows

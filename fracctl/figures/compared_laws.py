@@ -42,9 +42,10 @@ def laws(results: Results) -> list[str]:
 
 
 def look(results: Results, law: str) -> dict[str, Any]:
-    """Return colour and marker of a law."""
+    """Return colour and marker of a law; the markers are open, for laws often meet in one point."""
     place = laws(results).index(law)
-    return {"color": CYCLE[place % len(CYCLE)], "marker": _MARKERS[place % len(_MARKERS)], "linewidth": 1.0}
+    marker = {"marker": _MARKERS[place % len(_MARKERS)], "markerfacecolor": "none", "markeredgewidth": 0.9}
+    return {"color": CYCLE[place % len(CYCLE)], "linewidth": 1.0} | marker
 
 
 def law_name(law: str) -> str:

@@ -44,7 +44,7 @@ def build(results: Results, selection: Selection) -> tuple[Figure, pd.DataFrame]
             own = table[(table["initial_condition"] == name) & (table["limit"] == kind)]
             own = own[own["limit_value"] == value].sort_values("threshold_m")
             for place, law in reversed(list(enumerate(laws(results)))):
-                of_law, size = own[own["law"] == law], 2.8 + 0.5 * place
+                of_law, size = own[own["law"] == law], 2.4 + 1.1 * place
                 ax.loglog(of_law["threshold_m"], of_law["objective"] / scale, markersize=size, **look(results, law))
             note(ax, panel_title({"initial_condition": name, "limit": kind, "limit_value": value}))
     first = axes[0, 0]

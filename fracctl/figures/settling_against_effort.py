@@ -78,13 +78,7 @@ def _panel(ax: Axes, results: Results, table: pd.DataFrame, curve: pd.DataFrame)
         )
         for row in own.to_dict("records"):
             size = _SIZES[min(bands.index(row["threshold_m"]), len(_SIZES) - 1)]
-            point: dict[str, Any] = {
-                "markersize": size,
-                "markeredgewidth": 0.4,
-                "markeredgecolor": "white",
-                "zorder": 3,
-            }
-            ax.plot(row["delta_v_m_per_s"], row["settling_time_orbits"], **(style | point))
+            ax.plot(row["delta_v_m_per_s"], row["settling_time_orbits"], zorder=3, markersize=size, **style)
 
 
 def _curve(results: Results, selection: Selection) -> pd.DataFrame:

@@ -78,11 +78,29 @@ def test_a_tighter_band_takes_no_less_time(table: pd.DataFrame) -> None:
     assert (tight >= wide).all()
 
 
+def check_that_laws_hold_others(table: pd.DataFrame) -> None:
+    laws = table[table["law"] != "open_loop"]
+    for _, problem in laws.groupby(["initial_condition", "limit", "limit_value", "threshold_m"]):
+        value = problem.set_index("law")["objective"]
+        assert value["pd_alpha"] <= value["pd"] <= value["lqr"]
+        assert value["pid"] <= value["pd_lag"] <= value["pd"]
+
+
 def test_a_law_is_no_worse_than_one_that_it_holds(table: pd.DataFrame) -> None:
-    value = table.set_index(["limit", "threshold_m", "law"])["objective"]
-    for limit, band in table[["limit", "threshold_m"]].drop_duplicates().itertuples(index=False):
-        assert value[limit, band, "pd_alpha"] <= value[limit, band, "pd"] <= value[limit, band, "lqr"]
-        assert value[limit, band, "pid"] <= value[limit, band, "pd_lag"]
+    check_that_laws_hold_others(table)
+
+
+def test_points_of_simpler_laws_are_shown_as_what_they_are(table: pd.DataFrame) -> None:
+    laws = table[table["law"] != "open_loop"]
+    taken = laws[laws["found_for"] != laws["law"]]
+    assert len(taken)
+    keys = ["initial_condition", "limit", "limit_value", "threshold_m"]
+    inner = taken[keys].assign(law=taken["found_for"]).merge(laws, on=[*keys, "law"])
+    for column in ("objective", "k_p_w", "k_d_w", "delta_v_m_per_s", "worst_found_nearby", "least_delta_v_m_per_s"):
+        assert taken[column].to_numpy() == pytest.approx(inner[column].to_numpy(), rel=1e-12), column
+    neutral = {"pd_alpha": ("alpha_w", 1.0), "pd_lag": ("time_constant_w", 0.0), "pid": ("k_i_w", 0.0)}
+    for law, (column, value) in neutral.items():
+        assert (taken[taken["law"] == law][column] == value).all()
 
 
 def test_which_laws_extend_which() -> None:
@@ -208,6 +226,7 @@ def test_in_plane(tmp_path: Path) -> None:
     result = run_library("fair_inplane", words)
     table = RunDirectory(result.run_directory).table("comparison")
     assert table["law"].tolist() == [*LAWS, "open_loop"] * 4
+    check_that_laws_hold_others(table)
     assert result.summary["status"] == "finished"
 
 
