@@ -230,6 +230,19 @@ def test_in_plane(tmp_path: Path) -> None:
     assert result.summary["status"] == "finished"
 
 
+def test_integer_control_in_plane_goes_below_what_local_searches_find() -> None:
+    """For IC1 PD within ±8 reaches √(settling time · overshoot) below 1.25 at 100 m, where the paper has 3.55."""
+    words = ["initial_condition=[ic1]", "evaluation.gain_limits=[8]", "evaluation.peak_limits_mm_per_s2=[]"]
+    config = compose(["experiment=fair_inplane", *words, "survey.starts=4", "survey.evaluations=2560"])
+    evaluation, survey = build_checked(config)
+    (block,) = (b for b in survey.ask() if isinstance(b.search, Evolution) and b.search.law == "pd")
+    assert block.search is not None
+    rows = block.search(evaluation, block.design)
+    found = rows["objective"][(rows["part"] == "search") & (rows["threshold_m"] == 100.0)]
+    assert len(found) == 4
+    assert found.min() < 1.25
+
+
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
@@ -242,6 +255,7 @@ def test_in_plane(tmp_path: Path) -> None:
         (["evaluation.widest_gain=1"], "must be no less than the largest of `gain_limits`"),
         (["survey.population=4"], "must be at least 8"),
         (["survey.evaluations=10"], "must be at least two generations"),
+        (["survey.rounds=-1"], "survey.rounds = -1: must not be negative"),
     ],
 )
 def test_bad_input_gets_a_sentence(words: list[str], sentence: str) -> None:
