@@ -16,6 +16,9 @@ from fracctl.plants import RotatingEllipsoid
 from fracctl.store import RunDirectory
 
 
+SHORT = ["measures.lyapunov_exponent.periods=2", "measures.lyapunov_exponent.transient_periods=0"]
+
+
 def evaluation(words: list[str]) -> DelayedEvaluation:
     found = build_checked(compose(words))[0]
     assert isinstance(found, DelayedEvaluation)
@@ -31,7 +34,7 @@ def test_every_start_has_its_own_delay() -> None:
 
 
 def test_rows_do_not_depend_on_how_many_are_solved_together() -> None:
-    tumbling = evaluation(["experiment=libration", "horizon_periods=3"])
+    tumbling = evaluation(["experiment=libration", *SHORT, "horizon_periods=3"])
     gains = np.linspace(0.0, 0.6, AT_ONCE + 3)
     rows = tumbling({"gain_1_2": gains})
     alone = tumbling({"gain_1_2": gains[-1:]})
@@ -40,7 +43,7 @@ def test_rows_do_not_depend_on_how_many_are_solved_together() -> None:
 
 
 def test_a_row_is_the_run_of_the_library() -> None:
-    tumbling = evaluation(["experiment=libration", "horizon_periods=4"])
+    tumbling = evaluation(["experiment=libration", *SHORT, "horizon_periods=4"])
     found = tumbling.solve({"gain_1_2": 0.3, "recall": 0.2}, "tumbling")
     law = fracctl.controllers.DelayedFeedback([[0.0, 0.3]], 2.0 * np.pi, recall=0.2)
     loop = fracctl.ClosedLoop(fracctl.plants.Libration(), law)
@@ -55,9 +58,10 @@ def test_a_row_is_the_run_of_the_library() -> None:
 
 
 def test_stable_is_the_verdict_of_the_multipliers() -> None:
-    words = ["experiment=libration_window", "horizon_periods=2"]
+    words = ["experiment=libration_window", *SHORT, "horizon_periods=2"]
     rows = evaluation(words)({"gain_1_2": np.array([0.17, 0.20, 0.45, 0.48]), "recall": np.zeros(4)})
-    assert rows["stable"].tolist() == [False, True, True, False], "0.184 to 0.461, spec 2 section 1"
+    assert rows["stable"].tolist() == [False, True, True, False], "the window is 0.184 to 0.461"
+    assert rows["free_multipliers_above_one"].tolist() == [0.0] * 4, "the target is a flip saddle, -3.366 and -0.213"
     with_recall = evaluation(words)({"gain_1_2": np.array([0.235, 0.245]), "recall": np.full(2, 0.3)})
     assert with_recall["stable"].tolist() == [False, True], "0.2395 for R = 0.3"
 
@@ -72,7 +76,7 @@ def test_a_limit_of_the_thrust_is_kept() -> None:
 
 
 def test_no_target_no_verdict() -> None:
-    rows = evaluation(["experiment=libration", "horizon_periods=2"])({"gain_1_2": np.array([0.0])})
+    rows = evaluation(["experiment=libration", *SHORT, "horizon_periods=2"])({"gain_1_2": np.array([0.0])})
     assert rows["stable"].tolist() == [None]
     assert np.isnan(rows["largest_multiplier"]).all()
 

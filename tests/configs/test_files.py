@@ -182,6 +182,8 @@ def test_a_search_runs_on_a_tiny_budget(name: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", DELAYED)
 def test_an_experiment_under_delayed_feedback_runs_on_a_tiny_budget(name: str, tmp_path: Path) -> None:
     budget = ["horizon_periods=3", "solver.steps=40", *TINY_DELAYED.get(name, [])]
+    if name in ("libration", "libration_onset", "libration_window"):
+        budget += ["measures.lyapunov_exponent.periods=2", "measures.lyapunov_exponent.transient_periods=0"]
     config = compose([f"experiment={name}", *budget, f"output_dir={tmp_path}"])
     result = execute(config)
     assert result.summary["status"] == "finished"

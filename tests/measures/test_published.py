@@ -1,7 +1,7 @@
-"""The numbers of the paper and of the spec for its published gains.
+"""The numbers of the paper for its published gains, and numbers measured by an independent program.
 
-Origin: Yaylali, Butcher, Sinclair, out-of-plane and in-plane surveys; spec 1 sections 2-4 and spec 4 section 1 for
-the measured ones. The spec's U and OS are values on samples 0.01 apart (trapezoidal rule, largest sample); where the
+Origin: Yaylali, Butcher, Sinclair, out-of-plane and in-plane surveys; the measured ones were computed apart from this
+package. Their U and OS are values on samples 0.01 apart (trapezoidal rule, largest sample); where the
 control begins as s^(1-α) that sum is off by up to 0.5 %, so exact values stand beside them, from the reference
 measures, which agree with adaptive quadrature to 1e-9.
 """
@@ -84,7 +84,7 @@ def test_control_efforts(
 
 
 def test_control_effort_depends_on_the_horizon() -> None:
-    """IC2 at α = 0.97: the tail υ ~ s^(-α) has no integral; spec 1 section 2 prints this table to about 1e-4."""
+    """IC2 at α = 0.97: the tail υ ~ s^(-α) has no integral, here to about 1e-4."""
     horizons = np.array([4.0, 8.0, 12.0, 16.0, 20.0]) * np.pi
     member = out_of_plane("ic2", 0.97, 0.75, 1.95)
     efforts = [column(ControlEffort(), solve([member], s)) for s in horizons]
@@ -154,7 +154,7 @@ def test_not_settled_by_the_horizon_is_infinite() -> None:
 def test_in_plane_measures(
     gains: list[list[float]], alpha: list[float], settling: float | None, overshoot: float | None, combined: float
 ) -> None:
-    """IC1 with the printed gain matrices (spec 1 section 4, row "measured")."""
+    """IC1 with the printed gain matrices of the in-plane survey."""
     trajectory = solve([loops.in_plane(gains, alpha, loops.initial_state("ic1", "uv"))], HORIZON)
     st, os = column(SettlingTime(), trajectory), column(Overshoot("largest_extremum"), trajectory)
     assert np.sqrt(st * os) == pytest.approx(combined, abs=1.1e-3)

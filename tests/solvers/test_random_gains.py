@@ -138,7 +138,7 @@ def test_extreme_gains_are_honest() -> None:
 
 
 def test_every_positive_gain_is_stable_out_of_plane() -> None:
-    """On σ = iω the imaginary part of det M is k_D ω^α sin(απ/2) > 0 for k_P, k_D > 0 (spec 1 section 6)."""
+    """On σ = iω the imaginary part of det M is k_D ω^α sin(απ/2) > 0 for k_P, k_D > 0."""
     generator = np.random.default_rng(12)
     k_p, k_d, alpha = (
         generator.uniform(1e-3, 8.0, 200),

@@ -89,7 +89,7 @@ def grid(alpha: float) -> tuple[ClosedLoop, np.ndarray, np.ndarray]:
     ],
 )
 def test_published_optima_of_settling_time(name: str, alpha: float, k_p: float, k_d: float, settling: float) -> None:
-    """The least ST on the paper's grid (spec 1 section 3, first five rows)."""
+    """The least ST on the paper's grid."""
     loop, all_p, all_d = grid(alpha)
     times = surveyed(loop, loops.initial_state(name, "w")[None])["settling_time"][0]
     best = int(np.argmin(times))
