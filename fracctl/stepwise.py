@@ -72,13 +72,15 @@ class StepwiseTrajectory:
     """What the thrusters can give."""
     horizon: float
     end: Floats
-    """When each member ended: the horizon, a terminal event, or where it stopped being finite, (b,)."""
+    """When each member ended: the horizon, a terminal event, or where its motion could not be followed, (b,)."""
     events: Mapping[str, Floats]
     """First time of each event of the plant, NaN where it did not happen, each (b,)."""
     status: Array
-    """A word each, (b,): ``ok``, the name of a terminal event, ``diverged`` or ``failed`` (above the tolerance)."""
+    """A word each, (b,): ``ok``, the name of a terminal event, ``diverged`` (not finite, or too fast for its steps) or
+    ``failed`` (above the tolerance)."""
     error_estimate: Floats
-    """Largest estimated error of the states relative to their peak, from a run with half the steps, (b,)."""
+    """Largest estimated error of the states relative to their peak, from a run with half the steps, (b,); infinite
+    where that run did not last as long."""
     counters: Mapping[str, Array]
     """What the solve cost, ``steps``, each (b,)."""
     batched: bool = True

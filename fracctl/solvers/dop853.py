@@ -49,3 +49,12 @@ AT_STAGES: Floats = basis(NODES)
 SAMPLES: Floats = np.sin(0.5 * np.pi * np.arange(ROWS) / (ROWS - 1)) ** 2
 """Places in a step from whose values `FIT` makes C, (8,)."""
 FIT: Floats = np.asarray(np.linalg.inv(basis(SAMPLES)), dtype=np.float64)
+
+
+def local_error(values: Floats, scale: Floats) -> Floats:
+    """Return the estimated error of steps from Y (17, b n) over what is allowed, `scale` (b, n), (b,): 1 is allowed."""
+    fifth, third = ((weights @ values[1 : END + 2]).reshape(scale.shape) / scale for weights in (table.E5, table.E3))
+    square = (fifth**2).sum(axis=1)
+    both = square + 0.01 * (third**2).sum(axis=1)
+    error: Floats = square / np.sqrt(np.where(both > 0.0, both, 1.0) * scale.shape[1])
+    return error

@@ -7,15 +7,23 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fracctl.arrays import Array, Floats, finite
+from fracctl.arrays import Array, Booleans, Floats, finite
 from fracctl.controllers.adaptive_delay import AdaptiveDelayedFeedback
 from fracctl.controllers.delayed_feedback import DelayedLaw, DelayedTerm
 from fracctl.errors import ArgumentError, UnsupportedError
 from fracctl.loop import ClosedLoop, Need
 from fracctl.solvers.members import common_batch, positive, whole
 from fracctl.solvers.method_of_steps_adaptive import AdaptiveRun
-from fracctl.solvers.method_of_steps_events import first_times
-from fracctl.solvers.method_of_steps_mesh import mesh_of
+from fracctl.solvers.method_of_steps_events import Watch
+from fracctl.solvers.method_of_steps_mesh import breaks_of, mesh_of
+from fracctl.solvers.method_of_steps_refinement import (
+    for_members,
+    halved,
+    of_members,
+    pilot,
+    roughness,
+    with_own_steps,
+)
 from fracctl.solvers.method_of_steps_runs import RenewedGain, run
 from fracctl.stepwise import Steps, StepwiseTrajectory
 
@@ -24,6 +32,15 @@ _SAFE_RATIO = 63.0
 """Errors of N/2 and N steps differ by 2⁸ = 256 in the end; 2⁶ is already assumed to hold."""
 _SAFE_RATIO_AT_KINKS = 1.0
 """Where a saturation sets in within a step the error is O(N⁻²) and not regular."""
+_GOAL = 1e-6
+"""Errors above it, or above the tolerance, are worth steps of a member's own."""
+_SMOOTH, _JUMP = 1e-7, 0.1
+"""Shares of the state that the highest power of a step makes out: below, shorter steps gain nothing, since errors come
+from the growth of rounding; above, the step has jumped over what happens in it."""
+_ROOM = 5000
+"""A member gets so many steps of its own, and four times as many as it had; who needs more keeps the even ones."""
+_DOUBTFUL = 1e-3
+"""Above this error a step with such a jump is not believed."""
 
 
 class MethodOfSteps:
@@ -34,9 +51,13 @@ class MethodOfSteps:
     the plant are found on the extension. A saturation sets in within steps, which leaves O(N⁻²): about 1e-5 with 100
     steps to an orbit and 1e-6 with 400. The error is estimated by a second run with half the steps.
 
+    A member whose error is above 1e-6, or above the tolerance, because the motion is fast somewhere (a near pass) is
+    computed again with steps of its own, chosen by the error of each; the others keep theirs. Not so under a
+    saturation, renewed gains or an adaptive delay: there a member ends as ``diverged`` before a step that jumped over
+    something.
+
     Args:
-        steps: N, steps in the shortest delay, or in 2π of time where there is none; 100 serves most orbits, near passes
-            and large gains want 400.
+        steps: N, steps in the shortest delay, or in 2π of time where there is none; 100 serves most orbits.
         tolerance: error estimate, relative to the peak of the states, above which a member is ``failed``; 0 accepts any
             (the transients of chaotic plants cannot be computed to the end by anybody).
 
@@ -81,11 +102,12 @@ class MethodOfSteps:
             raise ArgumentError("initial_state", f"of shape {given.shape}", f"must have shape ({n},) or (b, {n})")
         batch = common_batch(loop.batch, len(given) if given.ndim == 2 else None)
         start = np.array(np.broadcast_to(given, (batch, n)))
-        problem = _Problem(loop, start, positive("horizon", horizon))
-        steps, terms, events, end = problem.solved(self.steps)
-        coarse, _, _, coarse_end = problem.solved(self.steps // 2)
-        error = _difference(steps, coarse, np.minimum(end, coarse_end))
-        error /= _SAFE_RATIO if loop.saturation is None else _SAFE_RATIO_AT_KINKS
+        problem = _Problem(loop, start, positive("horizon", horizon), self.steps)
+        with np.errstate(all="ignore"):
+            steps, terms, watch, error = problem.solved()
+            steps, error = problem.refined(steps, watch, error, self.tolerance or _GOAL)
+            problem.withdraw_doubtful(steps, watch, error)
+        end = watch.end
         return StepwiseTrajectory(
             plant=loop.plant,
             steps=steps,
@@ -93,8 +115,8 @@ class MethodOfSteps:
             saturation=loop.saturation,
             horizon=problem.horizon,
             end=end,
-            events=events,
-            status=problem.status(events, end, error, self.tolerance),
+            events=watch.times,
+            status=problem.status(watch, error, self.tolerance),
             error_estimate=error,
             counters={"steps": np.array([np.searchsorted(e, last) for e, last in zip(steps.edges, end, strict=True)])},
             batched=loop.batch is not None or given.ndim == 2,
@@ -102,71 +124,101 @@ class MethodOfSteps:
 
 
 class _Problem:
-    """A loop with its initial states and its horizon."""
+    """A loop with its initial states, its horizon and N."""
 
-    def __init__(self, loop: ClosedLoop, start: Floats, horizon: float) -> None:
+    def __init__(self, loop: ClosedLoop, start: Floats, horizon: float, count: int) -> None:
         self.plant, self.saturation = loop.plant, loop.saturation
-        self.start, self.horizon = start, horizon
+        self.start, self.horizon, self.count = start, horizon, count
         self.terms = tuple(term.of(len(start)) for term in loop.delayed_terms)
         self.law = law = loop.controller
         self.history = law.history if isinstance(law, DelayedLaw) else None
         self.breaks = law.history_breaks if isinstance(law, DelayedLaw) else ()
 
-    def solved(self, count: int) -> tuple[Steps, tuple[DelayedTerm, ...], dict[str, Floats], Floats]:
-        """Return the states with N = `count`, the terms with their gains, times of events, and each member's end."""
+    def solved(self) -> tuple[Steps, tuple[DelayedTerm, ...], Watch, Floats]:
+        """Return the states on even steps, the terms with their gains, what ended members, and estimated errors."""
+        watch = Watch(self.plant.events, np.full(len(self.start), self.horizon))
+        steps, terms = self._on_even_steps(self.count, watch)
+        coarse, _ = self._on_even_steps(self.count // 2, Watch((), watch.end))
+        error = _difference(steps, coarse, watch.end, self.horizon)
+        return steps, terms, watch, error / (_SAFE_RATIO if self.saturation is None else _SAFE_RATIO_AT_KINKS)
+
+    def _on_even_steps(self, count: int, watch: Watch) -> tuple[Steps, tuple[DelayedTerm, ...]]:
         terms = tuple(replace(t, schedule=RenewedGain(t)) if t.on_segment is not None else t for t in self.terms)
-        mesh = mesh_of(self.terms, self.breaks, count, self.horizon)
-        b = len(self.start)
-        if len(mesh.edges) < b:
-            mesh = type(mesh)(np.repeat(mesh.edges, b, axis=0), mesh.back, mesh.shares)
-        events = {event.name: np.full(b, np.nan) for event in self.plant.events}
-        end = np.full(b, self.horizon)
-        seen = 0
+        if isinstance(self.law, AdaptiveDelayedFeedback):
+            members = AdaptiveRun(self.plant, self.law, terms[0], self.saturation, count, self.start)
+            steps = members.until(self.horizon, watch)
+        else:
+            mesh = mesh_of(self.terms, self.breaks, count, self.horizon)
+            b = len(self.start)
+            if len(mesh.edges) < b:
+                mesh = type(mesh)(np.repeat(mesh.edges, b, axis=0), mesh.back, mesh.shares)
+            steps = run(self.plant, terms, self.saturation, self.history, mesh, self.start, watch)
+        watch.look_at_rest(steps)
+        return steps, terms
 
-        def finished(steps: Steps, taken: int) -> bool:
-            nonlocal seen
-            for event in self.plant.events:
-                waiting = np.flatnonzero(np.isnan(events[event.name]) & (end > steps.edges[:, seen]))
-                times = first_times(event, steps, seen, taken, waiting)
-                new, times = waiting[times <= end[waiting]], times[times <= end[waiting]]
-                events[event.name][new] = times
-                if event.terminal:
-                    end[new] = times
-            for times in events.values():
-                times[times > end] = np.nan
-            broken = ~np.isfinite(steps.coefficients[taken - 1]).all(axis=(0, 2))
-            for i in np.flatnonzero(broken & (end > steps.edges[:, seen])):
-                bad = ~np.isfinite(steps.coefficients[seen:taken, :, i]).all(axis=(1, 2))
-                end[i] = min(end[i], steps.edges[i, seen + int(np.argmax(bad))])
-            seen = taken
-            return bool(np.all(end <= steps.edges[:, taken]))
+    def refined(self, steps: Steps, watch: Watch, error: Floats, goal: float) -> tuple[Steps, Floats]:
+        """Return states and errors where members that rough steps keep from a goal have steps of their own."""
+        renewed = any(term.on_segment is not None for term in self.terms)
+        if renewed or self.saturation is not None or isinstance(self.law, AdaptiveDelayedFeedback):
+            return steps, error
+        missed = np.flatnonzero(~(error <= goal) | watch.diverged(self.horizon))
+        rough = _begun(steps, watch, missed) & ~(roughness(steps, missed) <= _SMOOTH)
+        members = missed[rough.any(axis=0) | watch.diverged(self.horizon)[missed]]
+        if not members.size:
+            return steps, error
+        own, found, own_error = self._on_own_steps(members, _ROOM + 4 * len(steps.coefficients))
+        done = np.flatnonzero(own.edges[:, -1] >= found.end)
+        watch.take(members[done], found, done)
+        error[members[done]] = own_error[done]
+        own = Steps(own.edges[done], own.coefficients[:, :, done], None)
+        return with_own_steps(steps, members[done], own), error
 
-        with np.errstate(all="ignore"):
-            if isinstance(self.law, AdaptiveDelayedFeedback):
-                members = AdaptiveRun(self.plant, self.law, terms[0], self.saturation, count, self.start)
-                steps = members.until(self.horizon, finished)
-            else:
-                steps = run(self.plant, terms, self.saturation, self.history, mesh, self.start, finished)
-            if seen < len(steps.coefficients) and not np.all(end <= steps.edges[:, seen]):
-                finished(steps, len(steps.coefficients))
-        return steps, terms, events, end
+    def _on_own_steps(self, members: Array, most: int) -> tuple[Steps, Watch, Floats]:
+        """Return states, what ended members, and estimated errors of some members on steps of their own."""
+        terms, start, b = of_members(self.terms, members), self.start[members], len(self.start)
+        history = self.history and for_members(self.history, members, b, start.shape[1:])
+        breaks = [breaks_of(terms, self.breaks, i, self.horizon) for i in range(len(members))]
+        shortest = np.min([term.delay for term in terms], axis=0) if terms else np.full(len(members), 2.0 * np.pi)
+        latest = np.full(len(members), self.horizon)
+        first = Watch(self.plant.events, latest)
+        rough = pilot(self.plant, terms, history, breaks, shortest / (self.count // 2), start, most, first)
+        first.look_at_rest(rough)
+        watch = Watch(self.plant.events, np.where(first.diverged(self.horizon), first.end, latest))
+        steps = run(self.plant, terms, None, history, halved(rough.edges), start, watch)
+        watch.look_at_rest(steps)
+        return steps, watch, _difference(steps, rough, watch.end, self.horizon) / _SAFE_RATIO
 
-    def status(self, events: dict[str, Floats], end: Floats, error: Floats, tolerance: float) -> Array:
+    def withdraw_doubtful(self, steps: Steps, watch: Watch, error: Floats) -> None:
+        """End inaccurate members before a step whose highest power is of the order of the state."""
+        members = np.flatnonzero(~(error <= _DOUBTFUL))
+        jumps = _begun(steps, watch, members) & ~(roughness(steps, members) <= _JUMP)
+        for member, steps_of_it in zip(members, jumps.T, strict=True):
+            if steps_of_it.any():
+                watch.stop(int(member), steps.edges[member, int(np.argmax(steps_of_it))])
+
+    def status(self, watch: Watch, error: Floats, tolerance: float) -> Array:
         """Return a word for each member."""
-        status = np.full(len(end), "ok", dtype=object)
-        if tolerance > 0.0:
-            status[~(error <= tolerance)] = "failed"
-        status[end < self.horizon] = "diverged"
+        status = np.full(len(error), "ok", dtype=object)
         for event in self.plant.events:
             if event.terminal:
-                status[events[event.name] == end] = event.name
+                status[watch.times[event.name] == watch.end] = event.name
+        if tolerance > 0.0:
+            status[~(error <= tolerance)] = "failed"
+        status[watch.diverged(self.horizon)] = "diverged"
         return status
 
 
-def _difference(fine: Steps, coarse: Steps, end: Floats) -> Floats:
+def _begun(steps: Steps, watch: Watch, members: Array) -> Booleans:
+    """Return which steps some members (r,) begin before they end, (S, r)."""
+    begun: Booleans = watch.end[members] > steps.edges[members, :-1].T
+    return begun
+
+
+def _difference(fine: Steps, coarse: Steps, end: Floats, horizon: float) -> Floats:
     """Return the largest difference at the ends of the coarse steps over the peak of the states, (b,)."""
-    times = np.minimum(coarse.edges, end[:, None])
+    last = np.where(end < horizon, np.nextafter(end, 0.0), end)
+    times = np.minimum(coarse.edges, last[:, None])
     states = fine(times)
     gap = np.abs(states - coarse(times)).max(axis=(1, 2))
     largest: Floats = gap / np.maximum(np.abs(states).max(axis=(1, 2)), np.finfo(np.float64).tiny)
-    return largest
+    return np.where(np.isnan(largest), np.inf, largest)

@@ -52,6 +52,25 @@ def mesh_of(terms: Sequence[DelayedTerm], history_breaks: Sequence[float], steps
     return Mesh(np.ascontiguousarray(edges[:, : needed + 1]), steps, shares)
 
 
+def breaks_of(
+    terms: Sequence[DelayedTerm], history_breaks: Sequence[float], member: int, horizon: float
+) -> list[float]:
+    """Return the times at which the solution of a member is not smooth, between 0 and the horizon and with both.
+
+    With one delay all multiples count, since a gain may be renewed and W recall a jump at any of them.
+    """
+    delays = [float(term.delay[member]) for term in terms]
+    if len(delays) == 1:
+        sums = [k * delays[0] for k in range(1, 2 + int(horizon / delays[0]))]
+    else:
+        sums = [sum(c) for k in range(1, _ORDER + 1) for c in combinations_with_replacement(delays, k)]
+    starts = [0.0, *history_breaks, *(float(term.switch_on[member]) for term in terms)]
+    times = sorted({t for s in starts for t in (s, *(s + d for d in sums)) if 0.0 < t < horizon})
+    same = _SAME * min(delays, default=horizon)
+    kept = [t for j, t in enumerate(times) if t - (times[j - 1] if j else 0.0) > same and horizon - t > same]
+    return [0.0, *kept, horizon]
+
+
 def _pairs(term: DelayedTerm) -> list[tuple[float, float]]:
     return list(zip(term.switch_on.tolist(), term.delay.tolist(), strict=True))
 
@@ -74,12 +93,8 @@ def _padded(terms: Sequence[DelayedTerm], history_breaks: Sequence[float], steps
     """Return steps of at most the shortest delay over `steps`, as many for every member."""
     rows = []
     for i in range(len(terms[0].delay)):
-        delays = [float(term.delay[i]) for term in terms]
-        longest = min(delays) / steps
-        sums = [sum(c) for k in range(1, _ORDER + 1) for c in combinations_with_replacement(delays, k)]
-        starts = [0.0, *history_breaks, *(float(term.switch_on[i]) for term in terms)]
-        times = sorted({t for s in starts for t in (s, *(s + d for d in sums)) if 0.0 < t < horizon})
-        ends = [0.0, *(t for j, t in enumerate(times) if j == 0 or t - times[j - 1] > _SAME * longest), horizon]
+        longest = min(float(term.delay[i]) for term in terms) / steps
+        ends = breaks_of(terms, history_breaks, i, horizon)
         rows.append(_filled(ends, np.ceil(np.diff(ends) / longest * (1.0 - 1e-12)).astype(int).tolist()))
     most = max(len(row) for row in rows)
     step = min(float(term.delay.min()) for term in terms) / steps

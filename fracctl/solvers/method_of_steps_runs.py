@@ -46,12 +46,12 @@ def run(
     count = mesh.edges.shape[1] - 1
     steps = Steps(mesh.edges, np.full((count, dop853.ROWS, b, n), np.nan), history)
     on_grid = mesh.back is not None
-    control = _on_the_grid(plant, terms, mesh, steps) if on_grid else _by_looking_up(terms, steps, plant.n_controls)
+    control = _on_the_grid(plant, terms, mesh, steps) if on_grid else by_looking_up(terms, steps, plant.n_controls)
     x, widths = start, np.diff(mesh.edges, axis=1)
     for k in range(count):
         h = np.ascontiguousarray(widths[:, k])
         times = mesh.edges[:, k] + dop853.NODES[:, None] * h
-        values = _step(plant, times, h, x, _limited(saturation, control(k, times)))
+        values = one_step(plant, times, h, x, _limited(saturation, control(k, times)))
         steps.coefficients[k] = (dop853.DENSE @ values).reshape(dop853.ROWS, b, n)
         x = (dop853.COMBINE[dop853.END] @ values).reshape(b, n)
         if k % _CHECK == _CHECK - 1 and finished(steps, k + 1):
@@ -59,7 +59,7 @@ def run(
     return steps
 
 
-def _step(plant: StatePlant, times: Floats, h: Floats, x: Floats, control: Control) -> Floats:
+def one_step(plant: StatePlant, times: Floats, h: Floats, x: Floats, control: Control) -> Floats:
     """Return Y = [x, h k_1, …, h k_16] of one step, (17, b n)."""
     values = np.empty((dop853.STAGES + 1, x.size))
     values[0] = x.ravel()
@@ -190,17 +190,16 @@ _INSIDE: Floats = np.clip(dop853.SAMPLES, 1e-14, 1.0 - 1e-14)
 """A history that jumps at the end of a step is asked on this side of it."""
 
 
-def _by_looking_up(terms: Sequence[DelayedTerm], steps: Steps, n_controls: int) -> Callable[[int, Floats], Control]:
+def by_looking_up(terms: Sequence[DelayedTerm], steps: Steps, n_controls: int) -> Callable[[int, Floats], Control]:
     """Delayed times lie anywhere: the reference is evaluated at all stages of a step."""
-    middles = 0.5 * (steps.edges[:, 1:] + steps.edges[:, :-1])
     free = np.zeros((steps.coefficients.shape[2], n_controls))
 
-    def control(k: int, times: Floats) -> Control:
+    def control(_: int, times: Floats) -> Control:
         parts = []
-        inside = _inside(times).T
+        inside, middle = _inside(times).T, 0.5 * (times[0] + times[dop853.END])
         for term in terms:
-            known = middles[:, k] > (0.0 if steps.history is not None else term.delay)
-            on = known & (middles[:, k] > term.switch_on)
+            known = middle > (0.0 if steps.history is not None else term.delay)
+            on = known & (middle > term.switch_on)
             if on.any():
                 reference = np.ascontiguousarray(np.swapaxes(steps.reference(term, inside), 0, 1))
                 reference[:, ~on] = 0.0

@@ -267,16 +267,6 @@ def test_uncontrolled_outcomes_about_eros() -> None:
     assert surface.end[0] == pytest.approx(trajectory.events["body_entry"][4], abs=1e-6)
 
 
-def test_collision_with_eros() -> None:
-    """ρ = 1.6 falls to the centre at t = 10.84; the last of it needs short steps."""
-    before, loop = 10.83, ClosedLoop(RotatingEllipsoid())
-    state = MethodOfSteps(800).solve(loop, [0.0, 1.0, 1.6, 0.0], before).states[-1]
-    fall = MethodOfSteps(100_000).solve(loop, state, 0.02)
-    assert list(fall.status) == ["collision"]
-    assert before + fall.events["collision"][0] == pytest.approx(10.84, abs=0.005)
-    assert np.hypot(*fall(fall.end[0])[0, :2]) == pytest.approx(0.02, abs=1e-10)
-
-
 def test_controlled_orbit_about_eros() -> None:
     """ρ = 1.9, τ = 3.10656: errors fall as 2e-6, 5e-9, 1e-11 for N = 20, 40, 80 over 20 orbits, and u → 0."""
     tau, t = 3.10656, 3.10656 * np.linspace(0.0, 20.0, 101)
@@ -303,9 +293,10 @@ def test_events_of_a_user_and_divergence() -> None:
 
 
 def test_a_tolerance_tells_failures_apart() -> None:
+    """The chaotic libration cannot be computed for long by anybody."""
+    chaotic = MethodOfSteps(16, tolerance=1e-9).solve(ClosedLoop(Libration()), [0.0, 1.0], 80.0 * np.pi)
+    assert list(chaotic.status) == ["failed"]
     loop = ClosedLoop(RotatingEllipsoid())
-    rough = MethodOfSteps(16, tolerance=1e-9).solve(loop, [0.0, 1.0, 1.9, 0.0], 20.0)
-    assert list(rough.status) == ["failed"]
     fine = solve(loop, [0.0, 1.0, 1.9, 0.0], 20.0, solver="method_of_steps", tolerance=1e-6)
     assert list(fine.status) == ["ok"]
 
