@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import zip_longest
 from typing import Any
 
 import numpy as np
@@ -17,12 +18,15 @@ from fracctl.figures.results import Results, Selection
 from fracctl.figures.style import BLUE, FULL_WIDTH_IN, GREY, ORANGE
 from fracctl.plants import RotatingEllipsoid
 
-_PANEL_HEIGHT_IN = 2.6
+_COLUMNS = 3
+"""Of panels of free motion alone."""
+_HEIGHT_OVER_WIDTH = 0.75
+"""Of a panel."""
 _TITLES = {"baseline": "free", "overall": "controlled"}
 
 
 def build(results: Results, selection: Selection) -> tuple[Figure, pd.DataFrame]:
-    """Draw a row for each initial condition: free motion left, controlled motion right.
+    """Draw a row for each initial condition: free motion left, controlled motion right; or free motion alone in threes.
 
     Free motion is grey, controlled motion blue, its last delay orange; a dot marks the beginning.
     Angles are wrapped. A body is drawn where the plant has one.
@@ -31,17 +35,20 @@ def build(results: Results, selection: Selection) -> tuple[Figure, pd.DataFrame]
         FigureError: the run holds no trajectory of an optimum.
     """
     curves = {name: curves_of(results, selection, name) for name in selection.initial_conditions}
-    height = _PANEL_HEIGHT_IN * len(curves)
-    figure = Figure(figsize=(FULL_WIDTH_IN, height), layout="constrained")
-    axes = figure.subplots(len(curves), 2, squeeze=False)
-    for (name, found), row in zip(curves.items(), axes, strict=True):
-        by_kind = {curve.kind: curve for curve in found}
-        for ax, kind in zip(row, _TITLES, strict=True):
-            if kind not in by_kind:
-                ax.set_axis_off()
-                continue
-            _draw(ax, by_kind[kind], results)
-            ax.set_title(f"{labels.initial_condition(name)}, {_TITLES[kind]}{_ending(by_kind[kind])}")
+    panels = {(name, curve.kind): curve for name, found in curves.items() for curve in found}
+    kinds = [kind for kind in _TITLES if any(kind == of for _, of in panels)]
+    places = [(name, kind) for name in curves for kind in kinds]
+    columns = 2 if len(kinds) > 1 else min(_COLUMNS, len(places))
+    rows = math.ceil(len(places) / columns)
+    size = (FULL_WIDTH_IN, _HEIGHT_OVER_WIDTH * FULL_WIDTH_IN / max(columns, 2) * rows)
+    figure = Figure(figsize=size, layout="constrained")
+    for ax, place in zip_longest(figure.subplots(rows, columns, squeeze=False).flat, places):
+        if place not in panels:
+            ax.set_axis_off()
+            continue
+        name, kind = place
+        _draw(ax, panels[place], results)
+        ax.set_title(f"{labels.initial_condition(name)}, {_TITLES[kind]}{_ending(panels[place])}")
     return figure, table_of(curves)
 
 
