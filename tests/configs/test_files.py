@@ -117,6 +117,7 @@ DELAYED = {
     "ellipsoid_free": 1,
     "ellipsoid_near": 2,
     "ellipsoid_regulator": 2,
+    "ellipsoid_starts": 2,
     "formation": 2,
     "formation_eccentric": 2,
     "formation_perturbed": 2,
