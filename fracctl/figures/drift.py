@@ -12,10 +12,10 @@ from fracctl.arrays import Floats
 from fracctl.figures import labels
 from fracctl.figures.curves import Curve, curves_of
 from fracctl.figures.results import Results, Selection
-from fracctl.figures.style import BLUE, FULL_WIDTH_IN, ORANGE
+from fracctl.figures.style import BLUE, FULL_WIDTH_IN, GREY
 
 _PANEL_HEIGHT_IN = 2.2
-_LINES = {"baseline": ("free", ORANGE), "overall": ("controlled", BLUE)}
+_COLOURS = {"baseline": GREY, "overall": BLUE}
 
 
 def build(results: Results, selection: Selection) -> tuple[Figure, pd.DataFrame]:
@@ -37,7 +37,7 @@ def build(results: Results, selection: Selection) -> tuple[Figure, pd.DataFrame]
             orbits = np.arange(len(places))
             moved = np.linalg.norm(places - places[0], axis=1)
             step = np.concatenate([[np.nan], np.linalg.norm(np.diff(places, axis=0), axis=1)])
-            label, colour = _LINES[curve.kind]
+            label, colour = labels.controller(curve.best), _COLOURS[curve.kind]
             left.semilogy(orbits[1:], np.maximum(moved[1:], 1e-16), color=colour, label=label)
             right.semilogy(orbits[1:], np.maximum(step[1:], 1e-16), color=colour, label=label)
             columns = {"orbit": orbits, "moved": moved, "drift": step}

@@ -31,7 +31,7 @@ def build(results: Results, selection: Selection) -> tuple[Figure, pd.DataFrame]
         periods = curve.times / math.tau
         error = curve.samples["periodicity_error"].to_numpy(float)
         left.semilogy(periods, np.maximum(error, 1e-16), color=BLUE, linewidth=0.8)
-        left.set_ylabel(f"{labels.initial_condition(name)}: $|x(t) - x(t-\\tau)|$")
+        left.set_ylabel(f"{labels.initial_condition(name)}:\n$|x(t) - x(t-\\tau)|$")
         _control(right, curve, periods, results)
     for ax in axes[-1]:
         ax.set_xlabel(f"Time ({results.period_name})")

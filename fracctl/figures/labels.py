@@ -68,7 +68,9 @@ def initial_condition(name: str) -> str:
 def controller(row: Mapping[str, Any]) -> str:
     """The law of a row of optima, e.g. PD^α with α_w = 0.91; its gains too where there are but two."""
     if "delay" in row:
-        return "free motion" if row["gain_factor"] == 0.0 else "delayed feedback"
+        rate = row.get("adaptation_rate")
+        under_control = "delayed feedback" if rate is None else "adaptive delay" if rate else "fixed delay"
+        return under_control if row["gain_factor"] else "free motion"
     orders = [name for name in row if name.startswith(("alpha_", "lambda_", "mu_", "time_constant_"))]
     gains = [name for name in row if name.startswith("k_")]
     shown = orders + (gains if len(gains) <= 2 else [])

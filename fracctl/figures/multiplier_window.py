@@ -2,20 +2,30 @@
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Sequence
+
 import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fracctl.figures import labels
 from fracctl.figures.results import FigureError, Results, Selection
 from fracctl.figures.style import BLUE, CYCLE, FULL_WIDTH_IN, GREY
+from fracctl.stability.windows import windows
 
 _HEIGHT_IN = 2.6
 _LOGARITHMIC = 50.0
+"""Values over more than this factor have a logarithmic axis."""
+_BAR = 0.03
+"""Height of a bar, of the axes'."""
 
 
 def build(results: Results, selection: Selection) -> tuple[Figure, pd.DataFrame]:
     """Draw multipliers left and the periodicity error at the end right, a line for each value of a second axis.
+
+    Shaded is where the multiplier is below 1, read off the straight lines between the points.
 
     Raises:
         FigureError: the survey does not vary one or two variables, or multipliers were not measured.
@@ -24,12 +34,12 @@ def build(results: Results, selection: Selection) -> tuple[Figure, pd.DataFrame]
         raise FigureError("the survey must vary one or two variables, and measure largest_multiplier")
     first, *second = results.varied
     figure = Figure(figsize=(FULL_WIDTH_IN, _HEIGHT_IN * len(selection.initial_conditions)), layout="constrained")
-    axes = figure.subplots(len(selection.initial_conditions), 2, squeeze=False)
+    axes = figure.subplots(len(selection.initial_conditions), 2, squeeze=False, sharex=True)
     columns = ["initial_condition", *results.varied, "largest_multiplier", "periodicity_error", "status"]
     table = results.evaluations[columns]
     for name, (left, right) in zip(selection.initial_conditions, axes, strict=True):
         rows = table[table["initial_condition"] == name]
-        groups = rows.groupby(second[0]) if second else [(None, rows)]
+        groups = list(rows.groupby(second[0])) if second else [(None, rows)]
         for colour, (value, group) in zip(CYCLE, groups, strict=False):
             label = f"${labels.symbol(second[0])} = {float(str(value)):g}$" if second else None
             x = group[first].to_numpy(float)
@@ -39,16 +49,26 @@ def build(results: Results, selection: Selection) -> tuple[Figure, pd.DataFrame]
         left.axhline(1.0, color=GREY, linewidth=0.8, linestyle=":")
         left.set_ylabel(f"{labels.initial_condition(name)}: largest multiplier")
         right.set_ylabel("periodicity error at the end")
-        positive = rows[first][rows[first] > 0.0]
+        left.set_ylim(bottom=0.0)
         for ax in (left, right):
             ax.set_xlabel(f"${labels.symbol(first)}$")
-            if len(positive) and len(positive) == len(rows) and positive.max() > _LOGARITHMIC * positive.min():
+            if x.min() > 0.0 and x.max() > _LOGARITHMIC * x.min():
                 ax.set_xscale("log")
         if second:
-            left.legend(loc="best")
+            _bars(left, first, [group for _, group in groups])
+            left.legend(loc="best", title="bars: multiplier below 1", title_fontsize=8)
         else:
-            stable = np.asarray(rows["largest_multiplier"] < 1.0)
-            left.fill_between(
-                rows[first].to_numpy(float), 0.0, 1.0, where=stable, color=BLUE, alpha=0.15, linewidth=0.0
-            )
+            for ax, (start, end) in itertools.product((left, right), _windows(rows, first)):
+                ax.axvspan(start, end, color=BLUE, alpha=0.15, linewidth=0.0, zorder=0)
     return figure, table.reset_index(drop=True)
+
+
+def _bars(ax: Axes, first: str, groups: Sequence[pd.DataFrame]) -> None:
+    """Draw a bar of each line's colour at the bottom where its multiplier is below 1."""
+    for place, (colour, group) in enumerate(zip(CYCLE, groups, strict=False)):
+        for start, end in _windows(group, first):
+            ax.axvspan(start, end, _BAR * place, _BAR * (place + 0.8), color=colour, alpha=0.6, linewidth=0.0, zorder=0)
+
+
+def _windows(rows: pd.DataFrame, first: str) -> list[tuple[float, float]]:
+    return windows(rows[first].to_numpy(float), 1.0 - rows["largest_multiplier"].to_numpy(float))

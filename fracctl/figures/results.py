@@ -20,8 +20,22 @@ from fracctl.units import Scales
 Row = Mapping[str, Any]
 """A row of optima, by column."""
 
-_DESIGN = ("alpha_", "lambda_", "mu_", "time_constant_", "k_", "gain_", "beta", "delay", "recall", "switch_on_delays")
+_DESIGN = (
+    "alpha_",
+    "lambda_",
+    "mu_",
+    "time_constant_",
+    "k_",
+    "gain_",
+    "beta",
+    "delay",
+    "recall",
+    "switch_on_delays",
+    "adapt",
+)
 """What columns of design variables begin with."""
+_IN_ORBIT = ("libration", "relative_motion", "perturbed_relative_motion")
+"""Plants whose time 2π is an orbit."""
 
 
 class FigureError(RunError):
@@ -92,8 +106,17 @@ class Results:
     @property
     def period_name(self) -> str:
         """What 2π of the dimensionless time is called."""
-        kind = self._plant["type"]
-        return "orbits" if kind.startswith("hcw") or kind == "relative_motion" else "periods $2\\pi$"
+        kind = str(self._plant["type"])
+        if kind == "rotating_ellipsoid":
+            return "rotations of the body"
+        return "orbits" if kind.startswith("hcw") or kind in _IN_ORBIT else "periods $2\\pi$"
+
+    @property
+    def time_name(self) -> str:
+        """What the dimensionless time is called."""
+        named = {"libration": "True anomaly $\\nu$ (rad)", "linear": "Time $s$"}
+        kind = str(self._plant["type"])
+        return "Time $s$" if kind.startswith("hcw") else named.get(kind, "Time $t$")
 
     @cached_property
     def scales(self) -> Scales | None:

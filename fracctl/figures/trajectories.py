@@ -50,7 +50,7 @@ def build(results: Results, selection: Selection) -> tuple[Figure, pd.DataFrame]
         _control(right, curves[name], component, results, times)
         left.set_ylabel(f"{labels.initial_condition(name)}: {left.get_ylabel()}")
     for ax in axes[-1]:
-        ax.set_xlabel("Time $s$")
+        ax.set_xlabel(results.time_name)
     for ax in axes[0]:
         top = ax.secondary_xaxis("top", functions=_scaling(1.0 / math.tau))
         top.set_xlabel(f"Time ({results.period_name})")
@@ -70,7 +70,8 @@ def _end(results: Results, curves: Sequence[Curve]) -> float:
 def _state(ax: Axes, curves: Sequence[Curve], component: str, results: Results, times: Floats) -> None:
     symbol, peak = labels.symbol(component), _peak(curves, component) or results.threshold or 0.0
     factor, note = labels.power_of_ten(peak)
-    ax.set_ylabel(f"position ${symbol}$" + note)
+    angle = " (rad)" if component in getattr(results.plant, "angles", ()) else ""
+    ax.set_ylabel(f"position ${symbol}$" + angle + note)
     _draw(ax, curves, component, results.threshold, times, factor)
     if results.scales is not None:
         metres = results.scales.length_m
@@ -98,7 +99,7 @@ def _draw(
     """Draw the curves, the ±δ band and the stars, divided by `factor`."""
     for curve in curves:
         label = labels.controller(curve.best)
-        if curve.kind == "baseline" and len(curves) == 1:
+        if curve.kind == "baseline" and len(curves) == 1 and "delay" not in curve.best:
             label += "\n(no other order does better)"
         ax.plot(times, curve.values(column, times) / factor, label=label, **_LINES[curve.kind])
     ax.set_xlim(0.0, times[-1])
