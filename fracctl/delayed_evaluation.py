@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
@@ -13,9 +13,11 @@ from fracctl.arrays import Array, Floats, joined
 from fracctl.controllers import Saturation
 from fracctl.design.delays import first_return, natural_period
 from fracctl.errors import ArgumentError
-from fracctl.evaluation import COUNTERS, Evaluation, geometric_mean
+from fracctl.evaluation import COUNTERS, Conclusion, Evaluation, geometric_mean
 from fracctl.loop import ClosedLoop
 from fracctl.measures.largest_multiplier import LargestMultiplier
+from fracctl.plants.state import StatePlant
+from fracctl.stability.windows import windows
 
 if TYPE_CHECKING:
     from fracctl.stepwise import StepwiseTrajectory
@@ -27,6 +29,7 @@ AT_ONCE = 64
 """Runs that are solved together; their polynomials are kept, 10 to 100 MB."""
 SAMPLES_IN_PERIOD = 100
 """Of a stored trajectory, in 2π of time."""
+_NEEDED_OF_PLANTS = {"period": ("period", "first_return or given"), "first_return": ("section", "period or given")}
 
 
 @dataclass(frozen=True)
@@ -37,8 +40,8 @@ class DelayedEvaluation(Evaluation):
     ``failed``. `stable` is the verdict of the largest multiplier, where that is measured.
 
     Raises:
-        UnsupportedError: the delay is to be the plant's period, but it has none.
-        ArgumentError: a measure's unit is not the plant's; or as `Evaluation`.
+        ArgumentError: the plant lacks the period or the section that the delay is to come from; a measure's unit or
+            guess is not the plant's; or as `Evaluation`.
     """
 
     delay_from: Literal["given", "period", "first_return"] = "given"
@@ -51,13 +54,22 @@ class DelayedEvaluation(Evaluation):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.delay_from == "period":
-            natural_period(self.plant)
+        plant: Any = self.plant
+        needed, others = _NEEDED_OF_PLANTS.get(self.delay_from, (None, ""))
+        if needed is not None and getattr(plant, needed, None) is None:
+            allowed = f"{type(plant).__name__} has no {needed} of its own"
+            raise ArgumentError("evaluation.delay_from", self.delay_from, allowed, f"take {others}")
         for measure in self.measures:
-            unit = getattr(measure, "unit", DIMENSIONLESS)
-            if self.plant.scales is None and unit != DIMENSIONLESS:
-                allowed = "needs a plant with units"
-                raise ArgumentError(f"measures.{measure.name}.unit", unit, allowed, f"take {DIMENSIONLESS}")
+            self._check(measure, plant)
+
+    def _check(self, measure: Any, plant: StatePlant) -> None:
+        name, unit = f"measures.{measure.name}", getattr(measure, "unit", DIMENSIONLESS)
+        if plant.scales is None and unit != DIMENSIONLESS:
+            raise ArgumentError(f"{name}.unit", unit, "needs a plant with units", f"take {DIMENSIONLESS}")
+        guess = getattr(measure, "guess", None)
+        if guess is not None and len(guess) != plant.n_states:
+            states = ", ".join(plant.state_names)
+            raise ArgumentError(f"{name}.guess", list(guess), f"must hold {plant.n_states} numbers, for {states}")
 
     def loop(self, design: Mapping[str, Floats | float]) -> ClosedLoop:
         """Return the closed loop from the first initial condition, with the law's own delay."""
@@ -69,7 +81,7 @@ class DelayedEvaluation(Evaluation):
         return max(2001, 1 + int(SAMPLES_IN_PERIOD * self.horizon / (2.0 * np.pi)))
 
     @cached_property
-    def _delays(self) -> dict[str, float] | None:
+    def delays(self) -> dict[str, float] | None:
         """τ by initial condition, None where the law's parameter decides."""
         if self.delay_from == "given":
             return None
@@ -83,8 +95,8 @@ class DelayedEvaluation(Evaluation):
         full = self._full_design(design)
         b, names = len(next(iter(full.values()))), list(self.initial_conditions)
         table = {name: np.tile(values, len(names)) for name, values in full.items()}
-        if self._delays is not None:
-            table[DELAY] = np.repeat([self._delays[name] for name in names], b)
+        if self.delays is not None:
+            table[DELAY] = np.repeat([self.delays[name] for name in names], b)
         states = np.repeat(np.stack(list(self.initial_conditions.values())), b, axis=0)
         conditions = np.repeat(np.array(names, object), b)
         parts = [
@@ -97,14 +109,26 @@ class DelayedEvaluation(Evaluation):
         rows = joined(parts) | {"initial_condition": conditions}
         return {name: rows[name] for name in self.row_columns}
 
+    def conclude(self, parts: Iterable[Mapping[str, Array]]) -> Conclusion:
+        """Return sentences on where the largest multiplier is below 1, of surveys over one or two axes."""
+        if LargestMultiplier.name not in self.row_columns:
+            return Conclusion()
+        names = ("initial_condition", *self.design_variables, LargestMultiplier.name)
+        rows = joined([{name: part[name] for name in names} for part in parts])
+        varied = [name for name in self.design_variables if np.unique(rows[name]).size > 2]
+        if not 1 <= len(varied) <= 2:
+            return Conclusion()
+        first = max(varied, key=lambda name: np.unique(rows[name]).size)
+        return Conclusion(notes=tuple(_stable_windows(rows, first, [name for name in varied if name != first])))
+
     def solve(  # type: ignore[override]
         self, design: Mapping[str, float], initial_condition: str, horizon: float | None = None
     ) -> StepwiseTrajectory:
         """Return the trajectory of one design point, over `horizon` or the evaluation's own."""
         state = self.initial_conditions[initial_condition]
         values: dict[str, Any] = dict(design)
-        if self._delays is not None:
-            values[DELAY] = self._delays[initial_condition]
+        if self.delays is not None:
+            values[DELAY] = self.delays[initial_condition]
         trajectory: StepwiseTrajectory = self._solver.solve(self._loop(values, state), state, horizon or self.horizon)
         return trajectory
 
@@ -147,3 +171,15 @@ class DelayedEvaluation(Evaluation):
         stable = np.array([None if np.isnan(value) else bool(value < 1.0) for value in largest], dtype=object)
         rows |= {"status": trajectory.status, "stable": stable, "error_estimate": trajectory.error_estimate}
         return rows | dict.fromkeys(COUNTERS, trajectory.counters["steps"])
+
+
+def _stable_windows(rows: Mapping[str, Array], first: str, others: Sequence[str]) -> Iterator[str]:
+    """Yield a sentence for every initial condition and value of another axis."""
+    order = np.argsort(rows[first], kind="stable")
+    groups = list(zip(rows["initial_condition"], *(rows[name] for name in others), strict=True))
+    for group in dict.fromkeys(groups):
+        places = [i for i in order if groups[i] == group]
+        found = windows(rows[first][places], 1.0 - rows[LargestMultiplier.name][places])
+        extent = " and ".join(f"{first} from {start:.3g} to {end:.3g}" for start, end in found) or f"no {first}"
+        at = "".join(f", {name} = {value:g}" for name, value in zip(others, group[1:], strict=True))
+        yield f"largest multiplier below 1 for {extent} ({group[0]}{at}; linear between points)"

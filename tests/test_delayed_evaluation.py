@@ -93,18 +93,48 @@ def test_multipliers_of_a_formation_against_the_weight(beta: float, largest: flo
     [
         (["experiment=libration", "solver=contour"], "evaluation=delayed and solver=method_of_steps go together"),
         (["solver=method_of_steps"], "go together"),
-        (["experiment=ellipsoid", "evaluation.delay_from=period"], "has no period of its own; use `first_return`"),
+        (
+            ["experiment=ellipsoid", "evaluation.delay_from=period"],
+            "has no period of its own; take first_return or given",
+        ),
+        (
+            ["experiment=libration", "evaluation.delay_from=first_return"],
+            "has no section of its own; take period or given",
+        ),
+        (["experiment=libration", "survey.axes.delay=[6.0,6.3]"], "survey.axes.delay: plays no part with"),
+        (["experiment=libration", "controller.delay=6.2"], "controller.delay = 6.2: plays no part with"),
+        (["experiment=libration_adaptive", "evaluation.delay_from=period"], "set evaluation.delay_from=given"),
+        (
+            ["experiment=libration_adaptive", "controller.recall=0.3"],
+            "controller.recall = 0.3: must be 0 where the delay",
+        ),
+        (["experiment=libration", "measures.largest_multiplier.guess=[1]"], "must hold 2 numbers, for phi, phi_dot"),
+        (["experiment=libration", "measures.overshoot={}"], "of linear fractional loops, not of the method of steps"),
+        (["measures.periodicity_error={}"], "of the method of steps, not of linear fractional loops"),
+        (["experiment=libration", "survey=lqr_seed"], "lqr takes linear plants, but Libration is none"),
         (["experiment=libration", "controller.recall=1.0"], "must lie in [0, 1)"),
         (["experiment=libration", "controller.delay=0"], "must lie in (0, inf)"),
         (["experiment=libration", "controller.gain_2_1=1"], "gain_2_1"),
         (["experiment=libration", "evaluation.delay_from=always"], "delay_from"),
-        (["experiment=libration", "measures.drift_per_orbit={}"], "needs a plant with units, but is km"),
+        (
+            ["experiment=libration", "measures.drift_per_orbit={}"],
+            "unit = km: needs a plant with units; take dimensionless",
+        ),
     ],
 )
 def test_what_cannot_be_run_gets_a_sentence(words: list[str], sentence: str) -> None:
     with pytest.raises(FracctlError) as problem:
         build_checked(compose(words))
     assert sentence in str(problem.value)
+
+
+def test_a_survey_of_gains_says_where_multipliers_are_below_one() -> None:
+    window = evaluation(["experiment=libration_window", "horizon_periods=2"])
+    gains = np.arange(0.14, 0.5, 0.02)
+    rows = window(window.parameters | {"gain_1_2": gains, "recall": np.zeros(gains.size)})
+    (note,) = window.conclude([rows]).notes
+    assert note == "largest multiplier below 1 for gain_1_2 from 0.186 to 0.46 (tumbling; linear between points)"
+    assert not window.conclude([{name: column[:1] for name, column in rows.items()}]).notes
 
 
 def test_free_motion_is_the_baseline_even_where_it_does_not_stay(tmp_path: Path) -> None:

@@ -44,54 +44,59 @@ class ResultTable:
         lines = []
         for name in dict.fromkeys(result.get("objective_name") for result in results):
             of_name = [result for result in results if result.get("objective_name") == name]
+            columns = self._columns(of_name, name)
             lines.append(_title(name, self.objectives.get(str(name), ())))
-            lines += table(self._upright(of_name, name) if self._is_long(of_name, name) else self._flat(of_name, name))
+            lines += table((self._upright if len(columns) > MOST_COLUMNS else self._flat)(of_name, name, columns))
         return lines
 
-    def _flat(self, results: Sequence[Mapping[str, Any]], name: str | None) -> list[list[str]]:
+    def _flat(self, results: Sequence[Mapping[str, Any]], name: str | None, columns: Sequence[str]) -> list[list[str]]:
         """A row for each point."""
-        rows: list[list[str]] = []
+        rows = [["", "", *_headings(columns, name)]] if columns else []
         for result in results:
-            columns = self._columns(result, name)
-            if not rows and columns:
-                rows.append(["", "", *_headings(columns, name)])
             rows += self._points(result, columns)
-            if result["change_percent"] is not None:
+            if _has_changed(result):
                 rows.append(["", "change", _percent(result)])
         return rows
 
-    def _upright(self, results: Sequence[Mapping[str, Any]], name: str | None) -> list[tuple[str, ...]]:
+    def _upright(
+        self, results: Sequence[Mapping[str, Any]], name: str | None, columns: Sequence[str]
+    ) -> list[list[str]]:
         """A column for each point."""
-        shown = next(filter(None, (self._columns(result, name) for result in results)))
-        columns = [["", "", *_headings(shown, name), "change"]]
+        written = [["", "", *_headings(columns, name), "change"]]
         for result in results:
-            points = self._points(result, self._columns(result, name))
-            change = _percent(result) if result["change_percent"] is not None else ""
-            columns += [[*point, end] for point, end in zip(points, (change, ""), strict=False)]
-        rows = list(itertools.zip_longest(*columns, fillvalue=""))
-        return [row for row in rows if any(row[1:])]
+            change = _percent(result) if _has_changed(result) else ""
+            written += [[*point, end] for point, end in zip(self._points(result, columns), (change, ""), strict=False)]
+        rows = itertools.zip_longest(*written, fillvalue="")
+        return [list(row) for row in rows if any(row[1:])]
 
-    def _is_long(self, results: Sequence[Mapping[str, Any]], name: str | None) -> bool:
-        return any(len(self._columns(result, name)) > MOST_COLUMNS for result in results)
-
-    def _columns(self, result: Mapping[str, Any], name: str | None) -> list[str]:
-        if result["optimum"] is None:
+    def _columns(self, results: Sequence[Mapping[str, Any]], name: str | None) -> list[str]:
+        """What is shown of each point; its status where one is not ok."""
+        points = [point for result in results for point in (result["optimum"], result["baseline"]) if point is not None]
+        if not points:
             return []
-        columns = [column for column in _columns(result["optimum"]) if column not in self.hidden]
-        return columns + ([f"objective_{name}"] if len(self.objectives.get(str(name), ())) > 1 else [])
+        columns = [column for column in _columns(points[0]) if column not in self.hidden]
+        columns += [f"objective_{name}"] if len(self.objectives.get(str(name), ())) > 1 else []
+        return columns + ([] if all(point.get("status", "ok") == "ok" for point in points) else ["status"])
 
     def _points(self, result: Mapping[str, Any], columns: Sequence[str]) -> list[list[str]]:
         """Optimum and baseline: initial condition, what it is, and the columns' values."""
         optimum, baseline = result["optimum"], result["baseline"]
         condition = str(result.get("initial_condition") or (optimum or {}).get("initial_condition") or "")
+        if baseline is not None and baseline == optimum:
+            return [[condition, f"{self.best} = baseline", *_values(columns, baseline)]]
         if optimum is None:
-            return [[condition, f"no {self.best}"]]
-        named = [(condition, self.best, optimum), ("", "baseline", baseline)]
-        return [
-            [where, label, *(cell for column in columns for cell in _cells(column, values.get(column)))]
-            for where, label, values in named
-            if values is not None
-        ]
+            only = f"no {self.best}" if baseline is None else f"baseline (no {self.best})"
+            return [[condition, only, *([] if baseline is None else _values(columns, baseline))]]
+        rest = [] if baseline is None else [["", "baseline", *_values(columns, baseline)]]
+        return [[condition, self.best, *_values(columns, optimum)], *rest]
+
+
+def _has_changed(result: Mapping[str, Any]) -> bool:
+    return result["change_percent"] is not None and result["optimum"] != result["baseline"]
+
+
+def _values(columns: Sequence[str], row: Mapping[str, Any]) -> list[str]:
+    return [cell for column in columns for cell in _cells(column, row.get(column))]
 
 
 def _headings(columns: Sequence[str], name: str | None) -> list[str]:

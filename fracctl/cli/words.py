@@ -30,7 +30,7 @@ def explain(config: RunConfig, evaluation: Evaluation, survey: Survey) -> list[s
         *_initial_conditions(evaluation),
         ("horizon", _time(evaluation.horizon, evaluation.plant.scales)),
         ("solver", _sentence(evaluation.solver, config.solver.type, _options(config.solver))),
-        ("evaluation", _sentence(evaluation, config.evaluation.type, _options(config.evaluation, hidden=("laws",)))),
+        ("evaluation", _sentence(evaluation, config.evaluation.type, _evaluated(config))),
         *_measures(config, evaluation),
         *_objectives(evaluation),
         *_survey(config, evaluation, survey),
@@ -39,6 +39,11 @@ def explain(config: RunConfig, evaluation: Evaluation, survey: Survey) -> list[s
         ("stored in", str(_directory(config))),
     ]
     return [config.name, *table([[name, text] for name, text in rows])]
+
+
+def _evaluated(config: RunConfig) -> str:
+    unlimited = getattr(config.evaluation, "largest_control", 0.0) is None
+    return _options(config.evaluation, hidden=("laws", "largest_by") if unlimited else ("laws",))
 
 
 def _plant(config: RunConfig, plant: LinearPlant) -> Iterator[_Row]:
@@ -62,11 +67,29 @@ def _law(config: RunConfig, evaluation: Evaluation) -> Iterator[_Row]:
         for place, (name, law) in enumerate(config.evaluation.laws.items()):
             yield "" if place else "compares", _sentence(registry.load("controllers", law.type), name, "")
         return
-    values = ", ".join(f"{name} = {number(evaluation.parameters[name])}" for name in evaluation.design_variables)
+    decided = getattr(config.evaluation, "delay_from", "given") != "given"
+    names = [name for name in evaluation.design_variables if not (decided and name == "delay")]
     yield "controller", _sentence(evaluation.law, config.controller.type, "")
     for equation in _equation(evaluation.law):
         yield "", equation
-    yield "", values
+    yield "", ", ".join(f"{name} = {number(evaluation.parameters[name])}" for name in names)
+    yield from _delays(config, evaluation)
+
+
+def _delays(config: RunConfig, evaluation: Evaluation) -> Iterator[_Row]:
+    """The delay of every start, where it is not a parameter of the law."""
+    source = getattr(config.evaluation, "delay_from", "given")
+    if source == "given":
+        return
+    delays: Mapping[str, float] = evaluation.delays  # type: ignore[attr-defined]
+    what = {"period": "the period of the plant", "first_return": "the first return of the free motion"}[source]
+    values = {name: f"{number(delay)} = {_time(delay, evaluation.plant.scales)}" for name, delay in delays.items()}
+    if len(set(values.values())) == 1:
+        yield "delay", f"{next(iter(values.values()))}, {what}"
+        return
+    yield "delay", what
+    for name, text in values.items():
+        yield "", f"{name}: {text}"
 
 
 def _initial_conditions(evaluation: Evaluation) -> Iterator[_Row]:
@@ -81,7 +104,7 @@ def _measures(config: RunConfig, evaluation: Evaluation) -> Iterator[_Row]:
     measures = zip(config.measures.items(), evaluation.measures, strict=False)
     for place, ((name, options), measure) in enumerate(measures):
         text = _options(options)
-        threshold = getattr(options, "threshold", None)
+        threshold = getattr(options, "threshold", None) if name == "settling_time" else None
         if evaluation.plant.scales is not None and isinstance(threshold, float):
             text += f" ({number(threshold * evaluation.plant.scales.length_m)} m)"
         yield "" if place else "measures", _sentence(measure, name, text)

@@ -19,6 +19,7 @@ from fracctl.config.schemas import DelayedEvaluation as DelayedOptions
 from fracctl.controllers import Saturation
 from fracctl.errors import ArgumentError, ConfigurationError
 from fracctl.evaluation import Evaluation
+from fracctl.measures.base import is_stepwise
 from fracctl.plants import LinearPlant
 from fracctl.surveys import Grid, Single, Survey, axis_values
 
@@ -50,12 +51,19 @@ def build_evaluation(config: RunConfig) -> Evaluation:
         "objective": config.objective,
     }
     if isinstance(config.evaluation, DelayedOptions):
-        from fracctl.delayed_evaluation import DelayedEvaluation
-
-        limit, by = config.evaluation.largest_control, config.evaluation.largest_by
-        saturation = None if limit is None else Saturation(limit, by)
-        return DelayedEvaluation(**common, delay_from=config.evaluation.delay_from, saturation=saturation)
+        return _delayed(config.evaluation, common)
     return Evaluation(**common)
+
+
+def _delayed(given: DelayedOptions, common: Mapping[str, Any]) -> Evaluation:
+    from fracctl.delayed_evaluation import DelayedEvaluation  # loads the solver
+
+    saturation = None if given.largest_control is None else Saturation(given.largest_control, given.largest_by)
+    try:
+        return DelayedEvaluation(**common, delay_from=given.delay_from, saturation=saturation)
+    except ArgumentError as error:
+        cure = f"; {error.instead}" if error.instead else ""
+        raise ConfigurationError(f"{error.name} = {error.value}: {error.allowed}{cure}") from error
 
 
 def _comparison(config: RunConfig, given: ComparisonEvaluation, common: Mapping[str, Any]) -> Evaluation:
@@ -107,8 +115,12 @@ def build_checked(config: RunConfig) -> tuple[Evaluation, Survey]:
         ConfigurationError: the solver does not take such a loop.
     """
     _check_kinds(config)
+    _check_measures(config)
     evaluation = build_evaluation(config)
-    refused = evaluation.solver.supports(evaluation.loop({}))
+    try:
+        refused = evaluation.solver.supports(evaluation.loop({}))
+    except ArgumentError as error:
+        raise ConfigurationError(f"controller.{error.name} = {error.value}: {error.allowed}") from error
     if refused is not None:
         raise ConfigurationError(f"solver.type = {config.solver.type}: {refused}")
     return evaluation, build_survey(config, evaluation)
@@ -120,6 +132,36 @@ def _check_kinds(config: RunConfig) -> None:
     if (kind == "delayed") != (solver == "method_of_steps"):
         cure = "evaluation=delayed and solver=method_of_steps go together"
         raise ConfigurationError(f"evaluation.type = {kind}: does not go with solver.type = {solver}; {cure}")
+    if isinstance(config.evaluation, DelayedOptions) and config.evaluation.delay_from != "given":
+        _check_no_delay_is_given(config, config.evaluation.delay_from)
+
+
+def _check_measures(config: RunConfig) -> None:
+    """Trajectories of the method of steps have measures of their own."""
+    kinds = ("linear fractional loops", "the method of steps")
+    stepwise = config.evaluation.type == "delayed"
+    for name in config.measures:
+        if is_stepwise(registry.load("measures", name)) is (not stepwise):
+            meant = f"is made for trajectories of {kinds[not stepwise]}, not of {kinds[stepwise]}"
+            raise ConfigurationError(f"measures.{name}: {meant}; choose others ('fracctl list measures')")
+
+
+def _check_no_delay_is_given(config: RunConfig, source: str) -> None:
+    """A delay that something else decides must not be set or varied: nobody would see that it plays no part."""
+    law = registry.load("controllers", config.controller.type)
+    default = next((p.default for p in law.parameters(build_plant(config).components) if p.name == "delay"), None)
+    given = build_parameters(config).get("delay")
+    survey = config.survey.model_dump()
+    words = []
+    if given != default:
+        words.append(f"controller.delay = {given:g}")
+    if "delay" in survey.get("axes", {}):
+        words.append("survey.axes.delay")
+    if "delay" in survey.get("vary", ()):
+        words.append("survey.vary = [delay]")
+    if words:
+        cure = "set evaluation.delay_from=given"
+        raise ConfigurationError(f"{words[0]}: plays no part with evaluation.delay_from = {source}; {cure}")
 
 
 def build_plant(config: RunConfig) -> LinearPlant:

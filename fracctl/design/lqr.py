@@ -10,7 +10,7 @@ from scipy.linalg import solve_continuous_are
 
 from fracctl.arrays import Floats, finite
 from fracctl.controllers.parameters import entry_names
-from fracctl.errors import ArgumentError
+from fracctl.errors import ArgumentError, UnsupportedError
 from fracctl.plants.linear import LinearPlant
 
 
@@ -30,7 +30,11 @@ def lqr(plant: LinearPlant, q: ArrayLike = 1.0, r: ArrayLike = 1.0, round_to: fl
     Raises:
         ArgumentError: a weight has a wrong shape or sign, is not symmetric, or no gains stabilise the plant at a finite
             cost; the step is not positive.
+        UnsupportedError: the plant is not linear.
     """
+    if not hasattr(plant, "stiffness"):
+        cure = "use `lqr_at`, or controller=delayed_lqr"
+        raise UnsupportedError(f"lqr takes linear plants, but {type(plant).__name__} is none; {cure}")
     m = plant.n_controls
     a = np.block([[np.zeros((m, m)), np.eye(m)], [plant.stiffness, plant.damping]])
     b = np.concatenate([np.zeros((m, m)), np.eye(m)])

@@ -15,7 +15,9 @@ from fracctl.surveys.base import POINT, SEARCHED_FOR, Rows
 Optimum = Mapping[str, Any]
 
 _ADDED_COLUMNS = ("kind", "slice", "objective_name", POINT, REASON, SEARCHED_FOR)
-_OPTIMUM_NEEDS = "an optimum has status ok, a finite value, and some control effort if that is part of it"
+_OPTIMUM_NEEDS = (
+    "an optimum has status ok, is not unstable, has a finite value, and some control effort if that is part of it"
+)
 
 
 class Tally:
@@ -38,6 +40,10 @@ class Tally:
     def rows(self) -> int:
         """Number of all rows."""
         return sum(counts.total() for counts in self._counts.values())
+
+    def only(self, initial_condition: str) -> bool:
+        """Return whether there is but one row of an initial condition."""
+        return self._counts.get(initial_condition, Counter()).total() == 1
 
     def sentence(self, initial_condition: str) -> str:
         """Return e.g. ``2 unsettled, 1 unstable``."""
@@ -96,6 +102,8 @@ def notes_on(found: Sequence[Mapping[str, Any]], baseline: Mapping[str, float], 
     notes = []
     for result in found:
         where = f"{result['objective_name']} for {result['initial_condition']}"
+        if result["optimum"] is None and tally.only(result["initial_condition"]) and result["baseline"] is not None:
+            continue
         if result["optimum"] is None:
             counts = tally.sentence(result["initial_condition"])
             notes.append(f"no optimum of {where} (points: {counts}); {_OPTIMUM_NEEDS}")

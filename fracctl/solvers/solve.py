@@ -86,5 +86,5 @@ def solve(
         return MethodOfSteps(tolerance=tolerance or 0.0).solve(loop, initial_state, horizon)
     if solver not in _SOLVERS:
         known = sorted([*_SOLVERS, "method_of_steps"])
-        raise ArgumentError("solver", repr(solver), f"must be one of {known}{suggestion(solver, known)}")
+        raise ArgumentError("solver", repr(solver), f"must be one of {known}{suggestion(str(solver), known)}")
     return make_solver(solver, tolerance).solve(loop, initial_state, horizon)

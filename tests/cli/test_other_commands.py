@@ -98,6 +98,17 @@ def test_show_without_units(capsys: pytest.CaptureFixture[str]) -> None:
     assert "own: x = 1" in text
 
 
+def test_show_tells_where_delays_come_from(capsys: pytest.CaptureFixture[str]) -> None:
+    text = "\n".join(lines(capsys, "show", "experiment=formation"))
+    assert "delay        6.28319 = 1 T = 1.51607 h, the period of the plant" in text
+    assert "formation_2_km: x = 0.000298507 (2000 m), y_dot = -0.000597015 (-4.60486 m/s)" in text
+    text = "\n".join(lines(capsys, "show", "experiment=ellipsoid"))
+    assert "delay        the first return of the free motion" in text
+    assert "rho_1_9: 3.10656 = 0.494424 T = 2.60574 h" in text
+    assert "delay = " not in text
+    assert "largest_by" not in text
+
+
 def test_show_names_the_directory_that_a_run_would_have(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     found = lines(capsys, "show", f"output_dir={tmp_path}")
     assert found[-1].split()[-1].startswith(f"{tmp_path}/custom/")

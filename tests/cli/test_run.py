@@ -88,6 +88,24 @@ def test_several_objectives_and_initial_conditions(capsys: pytest.CaptureFixture
     assert lines[7].split()[-1] == "0.395"
 
 
+def test_a_baseline_that_ended_early_is_shown_with_its_status(
+    capsys: pytest.CaptureFixture[str], stand_in: StandIn
+) -> None:
+    ended, stayed = POINT | {"status": "escaped"}, POINT | {"status": "ok"}
+    common = {"objective_name": "settling_time", "change_percent": None}
+    stand_in.further["optima"] = [
+        common | {"initial_condition": "ic1", "optimum": None, "baseline": ended},
+        common | {"initial_condition": "ic2", "optimum": stayed, "baseline": stayed, "change_percent": 0.0},
+    ]
+    assert main(["run", "experiment=ic1_outofplane"]) == 0
+    lines = [line.split() for line in capsys.readouterr().out.splitlines()]
+    assert lines[2][-1] == "status"
+    assert lines[3][:4] == ["ic1", "baseline", "(no", "optimum)"]
+    assert lines[3][-1] == "escaped"
+    assert lines[4][:4] == ["ic2", "optimum", "=", "baseline"]
+    assert lines[4][-1] == "ok"
+
+
 def test_many_gains_stand_below_each_other(capsys: pytest.CaptureFixture[str], stand_in: StandIn) -> None:
     names = ("alpha_u", "alpha_v", "k_p_u", "k_p_uv", "k_p_vu", "k_p_v", "k_d_u", "k_d_uv", "k_d_vu", "k_d_v")
     measured = {

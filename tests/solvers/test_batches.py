@@ -184,6 +184,8 @@ def test_solvers_by_name(name: str) -> None:
 def test_an_unknown_solver_is_refused() -> None:
     with pytest.raises(ArgumentError, match=r"must be one of .* did you mean 'volterra'"):
         make_solver("voltera")
+    with pytest.raises(ArgumentError, match="`solver` must be one of"):
+        solve(ClosedLoop(HCWOutOfPlane(), PDAlpha(1.0, 1.0, 0.9)), [0.0, 1.0], 1.0, solver=Contour())  # type: ignore[call-overload]
 
 
 @pytest.mark.parametrize(
