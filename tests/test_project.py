@@ -126,8 +126,9 @@ def test_documents_name_targets_that_exist() -> None:
         assert mentioned <= targets, name
 
 
-def test_the_readme_shows_what_comes_out() -> None:
-    failures, tests = doctest.testfile(str(ROOT / "README.md"), module_relative=False)
+@pytest.mark.parametrize("name", ["README.md", "docs/time_delayed_feedback.md", "docs/method_of_steps.md"])
+def test_documents_show_what_comes_out(name: str) -> None:
+    failures, tests = doctest.testfile(str(ROOT / name), module_relative=False)
     assert tests > 5
     assert failures == 0
 
