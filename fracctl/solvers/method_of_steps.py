@@ -36,7 +36,7 @@ _GOAL = 1e-6
 """Errors above it, or above the tolerance, are worth steps of a member's own."""
 _SMOOTH, _JUMP = 1e-7, 0.1
 """Shares of the state that the highest power of a step makes out: below, shorter steps gain nothing, since errors come
-from the growth of rounding; above, the step has jumped over what happens in it."""
+from the growth of rounding; above, even of the largest state, the step has jumped over what happens in it."""
 _ROOM = 5000
 """A member gets so many steps of its own, and four times as many as it had; who needs more keeps the even ones."""
 _DOUBTFUL = 1e-3
@@ -105,7 +105,7 @@ class MethodOfSteps:
         problem = _Problem(loop, start, positive("horizon", horizon), self.steps)
         with np.errstate(all="ignore"):
             steps, terms, watch, error = problem.solved()
-            steps, error = problem.refined(steps, watch, error, self.tolerance or _GOAL)
+            steps, error = problem.refined(steps, watch, error, min(self.tolerance or _GOAL, _GOAL))
             problem.withdraw_doubtful(steps, watch, error)
         end = watch.end
         return StepwiseTrajectory(
@@ -162,7 +162,7 @@ class _Problem:
         if renewed or self.saturation is not None or isinstance(self.law, AdaptiveDelayedFeedback):
             return steps, error
         missed = np.flatnonzero(~(error <= goal) | watch.diverged(self.horizon))
-        rough = _begun(steps, watch, missed) & ~(roughness(steps, missed) <= _SMOOTH)
+        rough = _begun(steps, watch, missed) & (roughness(steps, missed) > _SMOOTH)
         members = missed[rough.any(axis=0) | watch.diverged(self.horizon)[missed]]
         if not members.size:
             return steps, error
@@ -189,9 +189,11 @@ class _Problem:
         return steps, watch, _difference(steps, rough, watch.end, self.horizon) / _SAFE_RATIO
 
     def withdraw_doubtful(self, steps: Steps, watch: Watch, error: Floats) -> None:
-        """End inaccurate members before a step whose highest power is of the order of the state."""
+        """End inaccurate members before a step whose highest power is of the order of the largest state."""
         members = np.flatnonzero(~(error <= _DOUBTFUL))
-        jumps = _begun(steps, watch, members) & ~(roughness(steps, members) <= _JUMP)
+        rows, begun = steps.coefficients[:, :, members], _begun(steps, watch, members)
+        peak = np.where(begun, np.abs(rows[:, 0]).max(axis=-1), 0.0).max(axis=0)
+        jumps = begun & (np.abs(rows[:, -1]).max(axis=-1) > _JUMP * peak)
         for member, steps_of_it in zip(members, jumps.T, strict=True):
             if steps_of_it.any():
                 watch.stop(int(member), steps.edges[member, int(np.argmax(steps_of_it))])

@@ -81,7 +81,7 @@ def pilot(
         steps.coefficients[k] = (dop853.DENSE @ values).reshape(dop853.ROWS, b, n)
         now = np.where(due, goal, now + width)
         steps.edges[:, k + 1] = now
-        if (k % _CHECK == _CHECK - 1 or np.all(now >= ends[:, -1])) and watch(steps, k + 1):
+        if k % _CHECK == _CHECK - 1 and watch(steps, k + 1):
             break
     return Steps(steps.edges[:, : k + 2].copy(), steps.coefficients[: k + 1].copy(), history)
 
@@ -94,7 +94,7 @@ def halved(edges: Floats) -> Mesh:
 
 
 def roughness(steps: Steps, members: Array) -> Floats:
-    """Return for each step of some members (r,) how much of the state its highest power makes out, (S, r)."""
+    """Return for each step of some members (r,) its highest power over the state, (S, r); NaN at rest in 0."""
     rows = steps.coefficients[:, :, members]
     size = np.maximum(np.abs(rows[:, 0]).max(axis=-1), np.abs(rows[:, 0] + rows[:, 1]).max(axis=-1))
     share: Floats = np.abs(rows[:, -1]).max(axis=-1) / size

@@ -139,6 +139,15 @@ def test_what_lies_behind_a_jump_is_not_reported(kind: str) -> None:
     assert trajectory.events["body_entry"][0] == pytest.approx(0.779, abs=1e-3)
 
 
+def test_rest_at_zero_is_no_jump() -> None:
+    """x' = 0 until 1, then a growth that no doubles follow; a saturation forbids steps of its own."""
+    plant = FunctionPlant(lambda t, x, u: np.where(t < 1.0, 0.0, 9.0 * x.T + np.sin(40.0 * t)).T, 1, 1)
+    loop = ClosedLoop(plant, DelayedFeedback([[0.0]], 1.0), Saturation(1.0))
+    trajectory = MethodOfSteps(20).solve(loop, [0.0], 5.0)
+    assert trajectory.error_estimate[0] > 1e-3
+    assert list(trajectory.status) == ["ok"]
+
+
 def test_the_embedded_estimate_is_of_order_eight() -> None:
     """x' = x from 1: halving a step divides the estimate by 2⁸, and it is not below the error."""
     estimates = []
