@@ -144,10 +144,10 @@ class DelayedEvaluation(Evaluation):
     def sampled(self, trajectory: Any, times: Floats) -> dict[str, Floats]:
         """Return the `sampled_columns` of a single trajectory at times (t,), (t,) each."""
         states, controls = trajectory(times), trajectory.control(times)
-        delay = float(trajectory.terms[0].delay[0])
+        before = times - trajectory.delay(times)
         error = np.full(times.size, np.nan)
-        late = times >= delay
-        error[late] = np.linalg.norm(states[late] - trajectory(np.maximum(times[late] - delay, 0.0)), axis=1)
+        late = before >= 0.0
+        error[late] = np.linalg.norm(states[late] - trajectory(before[late]), axis=1)
         samples = np.column_stack([states, controls, error])
         return dict(zip(self.sampled_columns, samples.T, strict=True))
 

@@ -57,6 +57,23 @@ def test_a_row_is_the_run_of_the_library() -> None:
     assert np.isnan(samples["periodicity_error"][~late]).all()
 
 
+def test_stored_errors_are_those_of_the_delay_that_holds() -> None:
+    words = ["experiment=libration_adaptive", "controller.adapt_from_delays=8", "horizon_periods=12", "solver.steps=40"]
+    adaptive = evaluation([*words, "initial_condition.tumbling.phi=-0.28", "initial_condition.tumbling.phi_dot=-1.08"])
+    found = adaptive.solve({}, "tumbling")
+    times = np.linspace(0.0, found.end[0], 500)
+    samples = adaptive.sampled(found, times)
+    controlled = times > 2.1 * 2.0 * np.pi
+    pull = np.abs(samples["control_phi"][controlled]) / 0.3
+    assert (samples["periodicity_error"][controlled] >= pull * (1.0 - 1e-6)).all(), (
+        "u = -k (s - s_τ), a part of the error"
+    )
+    delays = found.delay(times)
+    last = samples["periodicity_error"][(delays == delays[-1]) & (times > times[-1] - delays[-1])]
+    peak = fracctl.measures.periodicity_error(found)
+    assert 0.5 * peak < last.max() <= peak * 1.01
+
+
 def test_stable_is_the_verdict_of_the_multipliers() -> None:
     words = ["experiment=libration_window", *SHORT, "horizon_periods=2"]
     rows = evaluation(words)({"gain_1_2": np.array([0.17, 0.20, 0.45, 0.48]), "recall": np.zeros(4)})
