@@ -10,6 +10,7 @@ import numpy as np
 from fracctl.arrays import Complexes, Floats
 from fracctl.controllers.delayed_feedback import DelayedTerm, GainFunction
 from fracctl.errors import ArgumentError
+from fracctl.measures.periods import periods
 from fracctl.stability.floquet import FEWEST_NODES, Neighbourhood, nontrivial_multipliers, real_above_one
 from fracctl.stability.periodic_orbits import shoot
 from fracctl.stepwise import StepwiseTrajectory
@@ -18,8 +19,8 @@ from fracctl.stepwise import StepwiseTrajectory
 class LargestMultiplier:
     """max |μ| over the non-trivial multipliers of the target orbit under the control of a run; below 1 it is stable.
 
-    The target is the free orbit whose period is the delay, found by shooting from a guess. NaN where there is none.
-    Of a run without control (K = 0) these are the multipliers of the free motion. Beside it stands how many of the
+    The target is the free orbit whose period is the last delay, found by shooting from a guess. NaN where there is
+    none. Of a run without control (K = 0) these are the multipliers of the free motion. Beside it stands how many of the
     target's own multipliers are real and above 1 (`fracctl.stability.real_above_one`): an odd number cannot be
     stabilised where the plant depends on time.
 
@@ -41,28 +42,23 @@ class LargestMultiplier:
 
     def __call__(self, trajectory: StepwiseTrajectory) -> dict[str, Floats]:
         """Return columns ``largest_multiplier`` and ``free_multipliers_above_one``, (b,)."""
+        delays = periods(trajectory, None)
+        guesses = self._guesses(trajectory, delays)
         targets: dict[tuple[float, ...], _Target | None] = {}
-        found = np.array([self._of(trajectory, i, targets) for i in range(len(trajectory.end))])
-        return dict(zip(self.columns, found.T, strict=True))
+        found = []
+        for member, (delay, guess) in enumerate(zip(delays.tolist(), guesses, strict=True)):
+            key = (delay, *guess.tolist())
+            if key not in targets:
+                targets[key] = _target(trajectory, guess, delay, self.nodes)
+            found.append(_of(targets[key], trajectory, member))
+        return dict(zip(self.columns, np.array(found).T, strict=True))
 
-    def _of(
-        self, trajectory: StepwiseTrajectory, member: int, targets: dict[tuple[float, ...], _Target | None]
-    ) -> tuple[float, float]:
-        term = trajectory.terms[0]
-        delay, recall = float(term.delay[member]), float(term.recall[member])
-        if self.guess is None:
-            last = delay * np.floor(trajectory.end / delay * (1.0 + 1e-12))[:, None]
-            guess = trajectory.steps(last)[member, 0]
-        else:
-            guess = np.asarray(self.guess, dtype=np.float64)
-        key = (delay, *guess.tolist())
-        if key not in targets:
-            targets[key] = _target(trajectory, guess, delay, self.nodes)
-        target, gain = targets[key], _gain(term, trajectory, member)
-        if target is None:
-            return np.nan, np.nan
-        values = target.free if gain is None else target.near.nontrivial(gain, recall)
-        return float(np.abs(values[0])), float(real_above_one(target.free))
+    def _guesses(self, trajectory: StepwiseTrajectory, delays: Floats) -> Floats:
+        """Return a state near the target of each member, (b, n)."""
+        if self.guess is not None:
+            return np.tile(np.asarray(self.guess, dtype=np.float64), (len(delays), 1))
+        last = delays * np.floor(trajectory.end / delays * (1.0 + 1e-12))
+        return trajectory.steps(last[:, None])[:, 0]
 
 
 @dataclass(frozen=True)
@@ -70,6 +66,15 @@ class _Target:
     near: Neighbourhood
     free: Complexes
     """Non-trivial multipliers without control."""
+
+
+def _of(target: _Target | None, trajectory: StepwiseTrajectory, member: int) -> tuple[float, float]:
+    if target is None:
+        return np.nan, np.nan
+    term = trajectory.terms[0]
+    gain = _gain(term, trajectory, member)
+    values = target.free if gain is None else target.near.nontrivial(gain, float(term.recall[member]))
+    return float(np.abs(values[0])), float(real_above_one(target.free))
 
 
 def _gain(term: DelayedTerm, trajectory: StepwiseTrajectory, member: int) -> Floats | GainFunction | None:
