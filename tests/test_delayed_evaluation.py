@@ -92,6 +92,14 @@ def test_a_limit_of_the_thrust_is_kept() -> None:
     assert peaks[1] == pytest.approx(0.01)
 
 
+def test_the_target_of_a_delay_that_adapts_has_the_last_one() -> None:
+    words = ["experiment=libration_adaptive", "measures.largest_multiplier={}", "horizon_periods=140"]
+    rows = evaluation(words)({"adaptation_rate": np.array([0.5])})
+    assert rows["final_delay"][0] == pytest.approx(2.0 * np.pi, abs=1e-6)
+    held = evaluation(["experiment=libration_window", *SHORT, "horizon_periods=2"])({"gain_1_2": np.array([0.3])})
+    assert rows["largest_multiplier"][0] == pytest.approx(held["largest_multiplier"][0], abs=1e-5)
+
+
 def test_no_target_no_verdict() -> None:
     rows = evaluation(["experiment=libration", *SHORT, "horizon_periods=2"])({"gain_1_2": np.array([0.0])})
     assert rows["stable"].tolist() == [None]

@@ -20,8 +20,8 @@ class LargestMultiplier:
     """max |μ| over the non-trivial multipliers of the target orbit under the control of a run; below 1 it is stable.
 
     The target is the free orbit whose period is the last delay, found by shooting from a guess. NaN where there is
-    none. Of a run without control (K = 0) these are the multipliers of the free motion. Beside it stands how many of the
-    target's own multipliers are real and above 1 (`fracctl.stability.real_above_one`): an odd number cannot be
+    none. Of a run without control (K = 0) these are the multipliers of the free motion. Beside it stands how many of
+    the target's own multipliers are real and above 1 (`fracctl.stability.real_above_one`): an odd number cannot be
     stabilised where the plant depends on time.
 
     Args:
