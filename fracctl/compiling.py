@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
+from numba import types
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
@@ -55,6 +56,25 @@ def compiled_with(**options: Any) -> Callable[[_Function], _Function]:
     return decorate
 
 
+def pointer_with(signature: Any) -> Callable[[_Function], _Function]:
+    """Return a decorator that compiles a function for one signature, at the import of its module.
+
+    Such functions can be handed over to kernels that take a `numba.types.FunctionType` of the signature. Their
+    arithmetic is not reordered: called directly or handed over they give the same bits.
+    """
+    options: dict[str, Any] = {"error_model": "numpy"} | _ALIKE
+
+    def decorate(function: _Function) -> _Function:
+        kernel: _Function
+        try:
+            kernel = numba.njit(signature, cache=True, **options)(function)
+        except RuntimeError:
+            kernel = numba.njit(signature, **options)(function)
+        return kernel
+
+    return decorate
+
+
 def helper_with(**options: Any) -> Callable[[_Function], _Function]:
     """Return a decorator for functions that only compiled functions call, with some options of `numba.njit`.
 
@@ -78,3 +98,5 @@ helper = helper_with(**_ARITHMETIC)
 """The decorator of functions that only kernels call."""
 inlined = helper_with(**_ARITHMETIC, inline="always")
 """The same for a function that is called at one place, which then is not compiled apart; without branches on ndim."""
+ACCELERATION = types.void(types.f8, *[types.f8[::1]] * 5)
+"""Signature of accelerations that can be handed over: of t, ξ, ξ', u, the plant's parameters, and ξ'' to write to."""

@@ -9,9 +9,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numba import types
 from numba.core import caching
 
-from fracctl.compiling import compiled, forget_outdated
+from fracctl.compiling import ACCELERATION, compiled, forget_outdated, pointer_with
 
 
 def test_without_a_writable_directory_kernels_are_compiled_all_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -23,6 +24,24 @@ def test_without_a_writable_directory_kernels_are_compiled_all_the_same(monkeypa
         return result
 
     assert total(np.array([1.0, 2.0])) == 3.0
+
+
+@pytest.mark.parametrize("writable", [True, False])
+def test_functions_of_one_signature_can_be_handed_over(writable: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    if not writable:
+        monkeypatch.setattr(caching.CompileResultCacheImpl, "_locator_classes", [])
+
+    @pointer_with(ACCELERATION)
+    def falling(t: float, q: np.ndarray, v: np.ndarray, u: np.ndarray, p: np.ndarray, out: np.ndarray) -> None:
+        out[:] = u - p[0] * q / t
+
+    @pointer_with(types.f8(types.FunctionType(ACCELERATION), types.f8[::1]))
+    def first(function: object, q: np.ndarray) -> float:
+        out = np.empty(3)
+        function(2.0, q, q, q, q, out)
+        return float(out[0])
+
+    assert first(falling, np.array([3.0, 1.0, 2.0])) == 3.0 - 3.0 * 3.0 / 2.0
 
 
 def test_the_package_works_where_no_kernel_can_be_stored() -> None:
