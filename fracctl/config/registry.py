@@ -30,6 +30,7 @@ BUILT_IN: Mapping[str, Mapping[str, str]] = {
         "relative_motion": "fracctl.plants:RelativeMotion",
         "perturbed_relative_motion": "fracctl.plants:PerturbedRelativeMotion",
         "rotating_ellipsoid": "fracctl.plants:RotatingEllipsoid",
+        "tether": "fracctl.plants:Tether",
     },
     "controllers": {
         "pd": "fracctl.controllers:PD",

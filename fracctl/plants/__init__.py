@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from fracctl.plants.perturbed_relative_motion import PerturbedRelativeMotion
     from fracctl.plants.relative_motion import RelativeMotion
     from fracctl.plants.rotating_ellipsoid import RotatingEllipsoid
+    from fracctl.plants.tether import Tether
 
 __all__ = [
     "HCW",
@@ -33,6 +34,7 @@ __all__ = [
     "RotatingEllipsoid",
     "Section",
     "StatePlant",
+    "Tether",
 ]
 
 _COMPILED = {
@@ -40,6 +42,7 @@ _COMPILED = {
     "PerturbedRelativeMotion": "perturbed_relative_motion",
     "RelativeMotion": "relative_motion",
     "RotatingEllipsoid": "rotating_ellipsoid",
+    "Tether": "tether",
 }
 
 

@@ -57,6 +57,7 @@ COMPANIONS = {
     "plant=linear": ["controller=pd_alpha_own", "initial_condition=own", "initial_condition.own.x=1"],
     "controller=pd_in_plane": ["plant=hcw_in_plane"],
     "controller=pd_alpha_in_plane": ["plant=hcw_in_plane"],
+    "plant=tether": ["experiment=libration", "initial_condition=own", "initial_condition.own.length=1"],
     "controller=pd_alpha_full": ["plant=hcw"],
     "controller=pd_lag_in_plane": ["plant=hcw_in_plane"],
     "controller=pid_in_plane": ["plant=hcw_in_plane"],
