@@ -100,3 +100,5 @@ inlined = helper_with(**_ARITHMETIC, inline="always")
 """The same for a function that is called at one place, which then is not compiled apart; without branches on ndim."""
 ACCELERATION = types.void(types.f8, *[types.f8[::1]] * 5)
 """Signature of accelerations that can be handed over: of t, ξ, ξ', u, the plant's parameters, and ξ'' to write to."""
+DEMAND = types.void(types.f8, *[types.f8[::1]] * 5, types.f8, *[types.f8[::1]] * 5)
+"""Signature of the demands of laws with memory, see `fracctl.controllers.memory.MemoryLaw`."""

@@ -11,6 +11,7 @@ import numpy as np
 from fracctl.arrays import Floats, batch_size
 from fracctl.controllers.delayed_feedback import DelayedLaw, DelayedTerm
 from fracctl.controllers.linear import LinearLaw, LinearLawTerms, ModelBasedLaw
+from fracctl.controllers.memory import MemoryLaw
 from fracctl.controllers.saturation import Saturation
 from fracctl.errors import ArgumentError, UnsupportedError
 from fracctl.fractional.system import LinearFractionalSystem
@@ -26,6 +27,7 @@ class Need(StrEnum):
     NONLINEAR_PLANT = "a nonlinear plant"
     DELAYS = "delayed states"
     SATURATION = "a saturated control"
+    NONLINEAR_LAW = "a nonlinear law with memory"
 
 
 @dataclass(frozen=True)
@@ -43,7 +45,7 @@ class ClosedLoop:
     """
 
     plant: LinearPlant | StatePlant
-    controller: LinearLaw | ModelBasedLaw | DelayedLaw | None = None
+    controller: LinearLaw | ModelBasedLaw | DelayedLaw | MemoryLaw | None = None
     saturation: Saturation | None = None
 
     def __post_init__(self) -> None:
@@ -59,6 +61,8 @@ class ClosedLoop:
             needs.add(Need.NONLINEAR_PLANT)
         if isinstance(self.controller, DelayedLaw):
             needs.add(Need.DELAYS)
+        elif isinstance(self.controller, MemoryLaw):
+            needs.add(Need.NONLINEAR_LAW)
         elif self.controller is not None:
             needs.add(Need.FRACTIONAL_TERMS)
         if self.saturation is not None:
@@ -79,7 +83,7 @@ class ClosedLoop:
             UnsupportedError: it is not one.
         """
         plant, given = self.plant, self.controller
-        if not isinstance(plant, LinearPlant) or isinstance(given, DelayedLaw):
+        if not isinstance(plant, LinearPlant) or isinstance(given, DelayedLaw | MemoryLaw):
             found = " and ".join(sorted(self.needs))
             raise UnsupportedError(f"a linear fractional loop is asked for, but this one has {found}")
         m = plant.n_controls
@@ -103,8 +107,13 @@ class ClosedLoop:
     @property
     def batch(self) -> int | None:
         """Batch size b, None for a single loop."""
+        limited = None if self.saturation is None else self.saturation.batch
+        if isinstance(self.controller, MemoryLaw):
+            sizes = {limited, self.controller.batch} - {None}
+            if len(sizes - {1}) > 1:
+                raise ArgumentError("controller", f"a batch of {self.controller.batch}", f"must be one of {limited}")
+            return max((size for size in sizes if size is not None), default=None)
         if self.delayed_terms:
-            limited = None if self.saturation is None else self.saturation.batch
             sizes = {limited, *(term.batch for term in self.delayed_terms)} - {None}
             if len(sizes - {1}) > 1:
                 raise ArgumentError(

@@ -25,6 +25,7 @@ BOTTOM_UP = (
     "features",
     "trajectory",
     "stepwise",
+    "meshwise",
     "solvers",
     "stability",
     "design",

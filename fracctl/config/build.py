@@ -19,9 +19,12 @@ from fracctl.config.schemas import DelayedEvaluation as DelayedOptions
 from fracctl.controllers import Saturation
 from fracctl.errors import ArgumentError, ConfigurationError
 from fracctl.evaluation import Evaluation
-from fracctl.measures.base import is_stepwise
+from fracctl.measures.base import TRAJECTORIES, trajectories_of
 from fracctl.plants import LinearPlant
 from fracctl.surveys import Grid, Single, Survey, axis_values
+
+_TRAJECTORIES = {"delayed": "StepwiseTrajectory", "memory": "MeshTrajectory"}
+_OWN_SOLVERS = {"delayed": "method_of_steps", "memory": "implicit_memory"}
 
 
 def build_evaluation(config: RunConfig) -> Evaluation:
@@ -127,22 +130,23 @@ def build_checked(config: RunConfig) -> tuple[Evaluation, Survey]:
 
 
 def _check_kinds(config: RunConfig) -> None:
-    """Delayed feedback is evaluated by its own solver, all else by the others."""
+    """Delayed feedback and laws with a memory in the loop have evaluations and solvers of their own."""
     kind, solver = config.evaluation.type, config.solver.type
-    if (kind == "delayed") != (solver == "method_of_steps"):
-        cure = "evaluation=delayed and solver=method_of_steps go together"
-        raise ConfigurationError(f"evaluation.type = {kind}: does not go with solver.type = {solver}; {cure}")
+    for evaluation, own in _OWN_SOLVERS.items():
+        if (kind == evaluation) != (solver == own):
+            cure = f"evaluation={evaluation} and solver={own} go together"
+            raise ConfigurationError(f"evaluation.type = {kind}: does not go with solver.type = {solver}; {cure}")
     if isinstance(config.evaluation, DelayedOptions) and config.evaluation.delay_from != "given":
         _check_no_delay_is_given(config, config.evaluation.delay_from)
 
 
 def _check_measures(config: RunConfig) -> None:
-    """Trajectories of the method of steps have measures of their own."""
-    kinds = ("linear fractional loops", "the method of steps")
-    stepwise = config.evaluation.type == "delayed"
+    """Every kind of trajectories has measures of its own."""
+    wanted = _TRAJECTORIES.get(config.evaluation.type, "Trajectory")
     for name in config.measures:
-        if is_stepwise(registry.load("measures", name)) is (not stepwise):
-            meant = f"is made for trajectories of {kinds[not stepwise]}, not of {kinds[stepwise]}"
+        taken = trajectories_of(registry.load("measures", name))
+        if taken not in (wanted, None):
+            meant = f"is made for trajectories of {TRAJECTORIES[str(taken)]}, not of {TRAJECTORIES[wanted]}"
             raise ConfigurationError(f"measures.{name}: {meant}; choose others ('fracctl list measures')")
 
 

@@ -1,8 +1,17 @@
-"""Control laws."""
+"""Control laws.
+
+Laws with compiled kernels are loaded at first use.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 from fracctl.controllers.adaptive_delay import AdaptiveDelayedFeedback
 from fracctl.controllers.delayed_feedback import DelayedFeedback, DelayedLaw, DelayedSum, DelayedTerm
 from fracctl.controllers.linear import LinearLaw, LinearLawTerms
+from fracctl.controllers.memory import MemoryLaw
 from fracctl.controllers.parameters import Parameter
 from fracctl.controllers.pd import PD
 from fracctl.controllers.pd_alpha import PDAlpha
@@ -10,18 +19,27 @@ from fracctl.controllers.pd_lag import PDLag
 from fracctl.controllers.pdd_alpha import PDDAlpha
 from fracctl.controllers.pi_lambda_d_mu import PILambdaDMu
 from fracctl.controllers.pid import PID
+from fracctl.controllers.references import Approach
 from fracctl.controllers.saturation import Saturation
+
+if TYPE_CHECKING:
+    from fracctl.controllers.fractional_sliding_mode import FractionalSlidingMode
+    from fracctl.controllers.sliding_mode import AdaptiveSlidingMode
 
 __all__ = [
     "PD",
     "PID",
     "AdaptiveDelayedFeedback",
+    "AdaptiveSlidingMode",
+    "Approach",
     "DelayedFeedback",
     "DelayedLaw",
     "DelayedSum",
     "DelayedTerm",
+    "FractionalSlidingMode",
     "LinearLaw",
     "LinearLawTerms",
+    "MemoryLaw",
     "PDAlpha",
     "PDDAlpha",
     "PDLag",
@@ -29,3 +47,14 @@ __all__ = [
     "Parameter",
     "Saturation",
 ]
+
+_COMPILED = {
+    "AdaptiveSlidingMode": "sliding_mode",
+    "FractionalSlidingMode": "fractional_sliding_mode",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name in _COMPILED:
+        return getattr(import_module(f"fracctl.controllers.{_COMPILED[name]}"), name)
+    raise AttributeError(f"module 'fracctl.controllers' has no attribute '{name}'")

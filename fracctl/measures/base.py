@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any, Protocol, runtime_checkable
 
 from fracctl.arrays import Floats
+from fracctl.meshwise import MeshTrajectory
 from fracctl.stepwise import StepwiseTrajectory
 from fracctl.trajectory import Trajectory
 
@@ -33,10 +34,28 @@ class StepwiseMeasure(Protocol):
         ...
 
 
-def is_stepwise(kind: Any) -> bool | None:
-    """Whether a class of measures takes trajectories of the method of steps or of other solvers, by its annotations.
+@runtime_checkable
+class MeshMeasure(Protocol):
+    """A named function of trajectories on a mesh, of laws with a memory in the loop."""
 
-    None where it does not say.
-    """
+    name: str
+    columns: tuple[str, ...]
+
+    def __call__(self, trajectory: MeshTrajectory) -> dict[str, Floats]:
+        """Return each column as (b,)."""
+        ...
+
+
+TRAJECTORIES = {
+    "Trajectory": "linear fractional loops",
+    "StepwiseTrajectory": "the method of steps",
+    "MeshTrajectory": "laws with a memory in the loop",
+}
+"""Class of the trajectories that a measure takes, and what they are called."""
+
+
+def trajectories_of(kind: Any) -> str | None:
+    """Return the class of trajectories that a class of measures takes, by its annotations; None if it does not say."""
     hint = next(iter(getattr(kind.__call__, "__annotations__", {}).values()), None)
-    return {"StepwiseTrajectory": True, "Trajectory": False}.get(getattr(hint, "__name__", str(hint)))
+    name = getattr(hint, "__name__", str(hint))
+    return name if name in TRAJECTORIES else None

@@ -13,6 +13,7 @@ from fracctl.solvers.batched import BatchSolver
 from fracctl.trajectory import Trajectory
 
 if TYPE_CHECKING:
+    from fracctl.meshwise import MeshTrajectory
     from fracctl.stepwise import StepwiseTrajectory
 
 _SOLVERS = {"contour": "Contour", "volterra": "Volterra", "collocation": "Collocation"}
@@ -53,8 +54,18 @@ def solve(
 
 @overload
 def solve(
+    loop: ClosedLoop,
+    initial_state: ArrayLike,
+    horizon: float,
+    solver: Literal["implicit_memory"],
+    tolerance: float | None = ...,
+) -> MeshTrajectory: ...
+
+
+@overload
+def solve(
     loop: ClosedLoop, initial_state: ArrayLike, horizon: float, solver: str, tolerance: float | None = ...
-) -> Trajectory | StepwiseTrajectory: ...
+) -> Trajectory | StepwiseTrajectory | MeshTrajectory: ...
 
 
 def solve(
@@ -63,7 +74,7 @@ def solve(
     horizon: float,
     solver: str = "contour",
     tolerance: float | None = None,
-) -> Trajectory | StepwiseTrajectory:
+) -> Trajectory | StepwiseTrajectory | MeshTrajectory:
     """Solve a closed loop.
 
     Args:
@@ -71,10 +82,11 @@ def solve(
         initial_state: [ξ(0), ξ'(0)], or x(0) of a plant in state form, (n,) or (b, n), dimensionless.
         horizon: last time, dimensionless.
         solver: ``contour``, ``volterra`` or ``collocation`` for linear fractional loops, ``method_of_steps`` for
-            delayed feedback and free motion, nonlinear plants included.
+            delayed feedback and free motion, nonlinear plants included; ``implicit_memory`` for laws with a memory in
+            the loop on stiff plants, as of a tether.
         tolerance: error relative to the peaks of positions and controls above which a trajectory is ``failed``; None
             for the solver's own, 1e-8 (1e-2 for ``collocation``, which is not made for more; any for
-            ``method_of_steps``, which tells its error in `error_estimate`).
+            ``method_of_steps`` and ``implicit_memory``, which tell their errors in `error_estimate`).
 
     Raises:
         ArgumentError: an argument is out of range, has a wrong shape, or names no solver.
@@ -84,7 +96,11 @@ def solve(
         from fracctl.solvers.method_of_steps import MethodOfSteps
 
         return MethodOfSteps(tolerance=tolerance or 0.0).solve(loop, initial_state, horizon)
+    if solver == "implicit_memory":
+        from fracctl.solvers.implicit_memory import ImplicitMemory
+
+        return ImplicitMemory(tolerance=tolerance or 0.0).solve(loop, initial_state, horizon)
     if solver not in _SOLVERS:
-        known = sorted([*_SOLVERS, "method_of_steps"])
+        known = sorted([*_SOLVERS, "implicit_memory", "method_of_steps"])
         raise ArgumentError("solver", repr(solver), f"must be one of {known}{suggestion(str(solver), known)}")
     return make_solver(solver, tolerance).solve(loop, initial_state, horizon)

@@ -1,0 +1,190 @@
+"""The equations of an implicit step: the rates at its end, by Newton's method or by bracketing."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from fracctl.arrays import Floats
+from fracctl.compiling import helper_with
+
+exact = helper_with(error_model="numpy")
+"""The decorator of functions that only kernels call, whose arithmetic is not reordered."""
+_MOST_ITERATIONS, _MOST_SWEEPS, _MOST_HALVINGS = 12, 60, 200
+_CLOSE = 1e-11
+"""Change of the rates, relative to 1 + |rate|, at which an iteration ends."""
+_STEP_OF_DIFFERENCES = 1e-8
+Q_KNOWN, V_KNOWN, D_KNOWN, D_SHARE, Q_WANTED, V_WANTED, LOWER, UPPER = range(8)
+"""Rows of what a step knows of its end: q = Q + c v, v' = (v - V)/c, D = D_K + share Δv, q_d, q_d', control limits."""
+Q, ERROR, ERROR_RATE, D, WANTED, CONTROL, RATE, RESIDUAL = range(8)
+"""Rows of what follows from the rates v at the end of a step."""
+
+
+@exact
+def respond(
+    acceleration: Any,
+    demand: Any,
+    t: float,
+    c: float,
+    v: Floats,
+    known: Floats,
+    base: Floats,
+    peaks: Floats,
+    plant: Floats,
+    law: Floats,
+    found: Floats,
+    z: Floats,
+) -> None:
+    """Fill `found` and `z` from the rates v at the end of a step."""
+    for i in range(len(v)):
+        found[Q, i] = known[Q_KNOWN, i] + c * v[i]
+        found[ERROR, i] = found[Q, i] - known[Q_WANTED, i]
+        found[ERROR_RATE, i] = v[i] - known[V_WANTED, i]
+        found[D, i] = known[D_KNOWN, i] + known[D_SHARE, i] * found[ERROR_RATE, i]
+    demand(t, found[Q], v, found[ERROR], found[ERROR_RATE], found[D], c, base, peaks, law, z, found[WANTED])
+    for i in range(len(v)):
+        found[CONTROL, i] = min(max(found[WANTED, i], known[LOWER, i]), known[UPPER, i])
+    acceleration(t, found[Q], v, found[CONTROL], plant, found[RATE])
+    for i in range(len(v)):
+        found[RESIDUAL, i] = v[i] - known[V_KNOWN, i] - c * found[RATE, i]
+
+
+@exact
+def newton(
+    acceleration: Any,
+    demand: Any,
+    t: float,
+    c: float,
+    v: Floats,
+    known: Floats,
+    base: Floats,
+    peaks: Floats,
+    plant: Floats,
+    law: Floats,
+    found: Floats,
+    z: Floats,
+    matrix: Floats,
+) -> int:
+    """Solve for the rates v by Newton's method with differences; return the iterations, or -1 if it does not end."""
+    m = len(v)
+    for iteration in range(_MOST_ITERATIONS):
+        respond(acceleration, demand, t, c, v, known, base, peaks, plant, law, found, z)
+        for i in range(m):
+            matrix[i, m] = found[RESIDUAL, i]
+        for j in range(m):
+            kept = v[j]
+            v[j] = kept + _STEP_OF_DIFFERENCES * (1.0 + abs(kept))
+            respond(acceleration, demand, t, c, v, known, base, peaks, plant, law, found, z)
+            for i in range(m):
+                matrix[i, j] = (found[RESIDUAL, i] - matrix[i, m]) / (v[j] - kept)
+            v[j] = kept
+        if not _eliminated(matrix):
+            return -1
+        close = True
+        for i in range(m):
+            close = close and abs(matrix[i, m]) <= _CLOSE * (1.0 + abs(v[i]))
+            v[i] -= matrix[i, m]
+        if close:
+            return iteration + 1
+    return -1
+
+
+@exact
+def _eliminated(matrix: Floats) -> bool:
+    """Solve the equations (m, m + 1) in place, the solution in the last column; False if they are singular."""
+    m = len(matrix)
+    for k in range(m):
+        pivot = k
+        for i in range(k + 1, m):
+            if abs(matrix[i, k]) > abs(matrix[pivot, k]):
+                pivot = i
+        if not abs(matrix[pivot, k]) > 0.0 or not math.isfinite(matrix[pivot, k]):
+            return False
+        for j in range(m + 1):
+            matrix[k, j], matrix[pivot, j] = matrix[pivot, j], matrix[k, j]
+        for i in range(m):
+            if i != k:
+                factor = matrix[i, k] / matrix[k, k]
+                for j in range(k, m + 1):
+                    matrix[i, j] -= factor * matrix[k, j]
+    for k in range(m):
+        matrix[k, m] /= matrix[k, k]
+    return True
+
+
+@exact
+def _residual_at(
+    acceleration: Any,
+    demand: Any,
+    t: float,
+    c: float,
+    v: Floats,
+    i: int,
+    value: float,
+    known: Floats,
+    base: Floats,
+    peaks: Floats,
+    plant: Floats,
+    law: Floats,
+    found: Floats,
+    z: Floats,
+) -> float:
+    """Return row i of the residual where its own rate has another value."""
+    v[i] = value
+    respond(acceleration, demand, t, c, v, known, base, peaks, plant, law, found, z)
+    residual: float = found[RESIDUAL, i]
+    return residual
+
+
+@exact
+def bracketed(
+    acceleration: Any,
+    demand: Any,
+    t: float,
+    c: float,
+    v: Floats,
+    known: Floats,
+    base: Floats,
+    peaks: Floats,
+    plant: Floats,
+    law: Floats,
+    found: Floats,
+    z: Floats,
+) -> bool:
+    """Solve row after row by bisection, each grows with its own rate, until the rates stay; return whether they do."""
+    for _ in range(_MOST_SWEEPS):
+        largest = 0.0
+        for i in range(len(v)):
+            before = v[i]
+            width = 1e-6 * (1.0 + abs(before))
+            low = high = before
+            below = above = _residual_at(
+                acceleration, demand, t, c, v, i, before, known, base, peaks, plant, law, found, z
+            )
+            while below > 0.0 and width < 1e12:
+                high, above = low, below
+                low -= width
+                width *= 4.0
+                below = _residual_at(acceleration, demand, t, c, v, i, low, known, base, peaks, plant, law, found, z)
+            while above < 0.0 and width < 1e12:
+                low, below = high, above
+                high += width
+                width *= 4.0
+                above = _residual_at(acceleration, demand, t, c, v, i, high, known, base, peaks, plant, law, found, z)
+            if not (below <= 0.0 <= above):
+                return False
+            for _ in range(_MOST_HALVINGS):
+                middle = 0.5 * (low + high)
+                if middle <= low or middle >= high:
+                    break
+                at = _residual_at(acceleration, demand, t, c, v, i, middle, known, base, peaks, plant, law, found, z)
+                if at < 0.0:
+                    low = middle
+                else:
+                    high = middle
+            v[i] = high
+            largest = max(largest, abs(high - before) / (1.0 + abs(high)))
+        if largest <= _CLOSE:
+            respond(acceleration, demand, t, c, v, known, base, peaks, plant, law, found, z)
+            return True
+    return False

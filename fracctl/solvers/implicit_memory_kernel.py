@@ -1,0 +1,196 @@
+"""Steps of BDF2 for a plant in second-order form under a law with memory, one member at a time."""
+
+from __future__ import annotations
+
+import math
+
+import numba
+import numpy as np
+
+from fracctl.arrays import Array, Floats
+from fracctl.compiling import ACCELERATION, DEMAND, compiled_with
+from fracctl.solvers.implicit_memory_equations import (
+    D_KNOWN,
+    D_SHARE,
+    ERROR_RATE,
+    LOWER,
+    Q_KNOWN,
+    Q_WANTED,
+    UPPER,
+    V_KNOWN,
+    V_WANTED,
+    WANTED,
+    D,
+    Q,
+    bracketed,
+    exact,
+    newton,
+    respond,
+)
+
+NEWTON, BRACKETED, UNRESOLVED = 0, 1, 2
+"""How the equations of a step were solved: by Newton's method, by bracketing each row in turn, or not."""
+_SMALL = 1e-3
+"""Below it, exponentials are replaced by their series."""
+
+
+@exact
+def _filters(rates: Floats, h: float, decay: Floats, early: Floats, late: Floats) -> None:
+    """Fill what a mode keeps over a step, and what it takes of a rate at its start and end that is linear between."""
+    for j in range(len(rates)):
+        s, z = rates[j], rates[j] * h
+        decay[j] = math.exp(-z)
+        if z < _SMALL:
+            early[j] = h * (0.5 - z / 3.0 + z * z / 8.0)
+            late[j] = h * (0.5 - z / 6.0 + z * z / 24.0)
+        else:
+            mean = -math.expm1(-z) / z
+            early[j] = (mean - decay[j]) / s
+            late[j] = (1.0 - mean) / s
+
+
+@exact
+def _known_of_the_end(
+    n: int,
+    h: float,
+    ratio: float,
+    states: Floats,
+    reference: Floats,
+    reference_rate: Floats,
+    orders: Floats,
+    weights: Floats,
+    decay: Floats,
+    modes: Floats,
+    known: Floats,
+) -> None:
+    """Fill `known` for the step from n to n + 1."""
+    m, earlier = len(orders), max(n - 1, 0)
+    one, two = _before(ratio)
+    for i in range(m):
+        known[Q_KNOWN, i] = one * states[n, i] - two * states[earlier, i]
+        known[V_KNOWN, i] = one * states[n, m + i] - two * states[earlier, m + i]
+        known[Q_WANTED, i] = reference[n + 1, i]
+        known[V_WANTED, i] = reference_rate[n + 1, i]
+        past = 0.0
+        for j in range(len(decay)):
+            past += weights[i, j] * decay[j] * modes[i, j]
+        share = h ** (1.0 - orders[i]) / math.gamma(3.0 - orders[i])
+        known[D_KNOWN, i] = past + share * (1.0 - orders[i]) * (states[n, m + i] - reference_rate[n, i])
+        known[D_SHARE, i] = share
+
+
+@exact
+def _before(ratio: float) -> tuple[float, float]:
+    """Return what the last two values add to one, and take from it, in a step `ratio` times as long as the last."""
+    lead = (1.0 + 2.0 * ratio) / (1.0 + ratio)
+    return (1.0 + ratio) / lead, ratio * ratio / (1.0 + ratio) / lead
+
+
+@exact
+def _taken(
+    n: int,
+    v: Floats,
+    found: Floats,
+    z: Floats,
+    reference_rate: Floats,
+    decay: Floats,
+    early: Floats,
+    late: Floats,
+    modes: Floats,
+    states: Floats,
+    memory: Floats,
+    demands: Floats,
+    auxiliary: Floats,
+    peaks: Floats,
+) -> bool:
+    """Store the end of step n and lead the modes there; return whether all states are numbers."""
+    m, finite = len(v), True
+    for i in range(m):
+        states[n + 1, i], states[n + 1, m + i] = found[Q, i], v[i]
+        memory[n + 1, i], demands[n + 1, i] = found[D, i], found[WANTED, i]
+        finite = finite and math.isfinite(found[Q, i]) and math.isfinite(v[i])
+        before = states[n, m + i] - reference_rate[n, i]
+        for j in range(len(decay)):
+            modes[i, j] = decay[j] * modes[i, j] + early[j] * before + late[j] * found[ERROR_RATE, i]
+    for k in range(len(z)):
+        auxiliary[n + 1, k] = z[k]
+        peaks[k] = max(peaks[k], abs(z[k]))
+    return finite
+
+
+@compiled_with(error_model="numpy")
+def march(
+    acceleration: numba.types.FunctionType(ACCELERATION),  # type: ignore[valid-type]
+    demand: numba.types.FunctionType(DEMAND),  # type: ignore[valid-type]
+    times: Floats,
+    plant: Floats,
+    law: Floats,
+    reference: Floats,
+    reference_rate: Floats,
+    orders: Floats,
+    rates: Floats,
+    weights: Floats,
+    limits: Floats,
+    modes: Floats,
+    states: Floats,
+    memory: Floats,
+    demands: Floats,
+    auxiliary: Floats,
+    how: Array,
+    iterations: Array,
+) -> int:
+    """Make all steps of one member.
+
+    Args:
+        acceleration: of the plant.
+        demand: of the law.
+        times: ends of the S steps, (S + 1,).
+        plant: the plant's numbers.
+        law: those of the law.
+        reference: q_d at the times, (S + 1, m).
+        reference_rate: q_d', (S + 1, m).
+        orders: ν, (m,).
+        rates: of the sum of exponentials, (J,).
+        weights: its weights, (m, J).
+        limits: of the controls, lower and upper, (2, m).
+        modes: φ(0), (m, J); overwritten.
+        states: to be filled, (S + 1, 2m); holds [q(0), q'(0)].
+        memory: to be filled with D^ν Δq, (S + 1, m).
+        demands: to be filled, (S + 1, m).
+        auxiliary: to be filled, (S + 1, p); holds z(0).
+        how: to be filled with how the equations of each step were solved, (S,).
+        iterations: to be filled with Newton's iterations, (S,).
+
+    Returns:
+        The number of steps taken before a state was no number.
+    """
+    m = len(orders)
+    known, found = np.empty((8, m)), np.zeros((8, m))
+    known[LOWER], known[UPPER] = limits[0], limits[1]
+    z, base, peaks = np.empty(auxiliary.shape[1]), np.empty(auxiliary.shape[1]), np.abs(auxiliary[0])
+    v, matrix = np.empty(m), np.empty((m, m + 1))
+    decay, early, late = np.empty(len(rates)), np.empty(len(rates)), np.empty(len(rates))
+    h = 0.0
+    for n in range(len(times) - 1):
+        ratio, h = (times[n + 1] - times[n]) / h if n else 0.0, times[n + 1] - times[n]
+        if abs(ratio - 1.0) > 1e-12:
+            _filters(rates, h, decay, early, late)
+        _known_of_the_end(n, h, ratio, states, reference, reference_rate, orders, weights, decay, modes, known)
+        one, two = _before(ratio)
+        for k in range(len(z)):
+            base[k] = one * auxiliary[n, k] - two * auxiliary[max(n - 1, 0), k]
+        for i in range(m):
+            v[i] = states[n, m + i] + (ratio * (states[n, m + i] - states[n - 1, m + i]) if n > 1 else 0.0)
+        t, c = times[n + 1], h * (1.0 + ratio) / (1.0 + 2.0 * ratio)
+        count = newton(acceleration, demand, t, c, v, known, base, peaks, plant, law, found, z, matrix)
+        how[n], iterations[n] = NEWTON, abs(count)
+        if count < 0:
+            v[:] = states[n, m:]
+            solved = bracketed(acceleration, demand, t, c, v, known, base, peaks, plant, law, found, z)
+            how[n] = BRACKETED if solved else UNRESOLVED
+        respond(acceleration, demand, t, c, v, known, base, peaks, plant, law, found, z)
+        if not _taken(
+            n, v, found, z, reference_rate, decay, early, late, modes, states, memory, demands, auxiliary, peaks
+        ):
+            return n
+    return len(times) - 1
