@@ -81,7 +81,7 @@ def helper_with(**options: Any) -> Callable[[_Function], _Function]:
     They are compiled and kept as parts of those: entries for Python would take a third more time to compile. To call
     one from Python is a crash.
     """
-    options |= _ALIKE | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+    options = _ALIKE | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True} | options
 
     def decorate(function: _Function) -> _Function:
         kernel: _Function = numba.njit(**options)(function)
@@ -90,6 +90,9 @@ def helper_with(**options: Any) -> Callable[[_Function], _Function]:
     return decorate
 
 
+called = helper_with(error_model="numpy", forceinline=False)
+"""The decorator of functions that only kernels call and that are not copied into them: too long, or called at many
+places. Their arithmetic is not reordered, so that all compiled copies give the same bits."""
 _ARITHMETIC: dict[str, Any] = {"error_model": "numpy", "fastmath": {"reassoc", "contract", "nsz", "arcp"}}
 """Arithmetic that may be reordered and divides by zero as NumPy does."""
 compiled = compiled_with(**_ARITHMETIC)

@@ -12,7 +12,9 @@ from fracctl.compiling import helper_with
 from fracctl.errors import ArgumentError
 
 NODES = 600
-"""Of a table; its cubics err by less than 1e-9."""
+"""Of a table; its cubics err by less than 1e-6 of ϑ."""
+_FASTEST = 50.0
+"""Exponent 1/(K₁ϑ) beyond which the adaptation is as good as a jump: e^-50 of σ."""
 _CELL, _CELL_WEIGHTS = np.polynomial.legendre.leggauss(8)
 
 
@@ -24,7 +26,7 @@ def adaptation_table(rate: float, weight: float, start: float) -> Floats:
 
     with dσ = ‖S_r2‖₁ df for ϑ₁ and ‖S_r2‖² df for ϑ₂. ϑ tends to the zero of the right hand side, a little above 1/K₁;
     the table ends where it is as good as there. As an equation in time it is too stiff to follow: e^(1/(K₁ϑ)) is e^20
-    at ϑ = 1.
+    at ϑ = 1. A table begins at ϑ = 1/(50 K₁) at least, which it reaches at once from below.
 
     Args:
         rate: K₁.
@@ -45,7 +47,8 @@ def adaptation_table(rate: float, weight: float, start: float) -> Floats:
     if not start < limit:
         raise ArgumentError("vartheta_0", start, f"must lie below {limit:.6g}, where the adaptation ends")
     share = 1.0 - np.linspace(0.0, 1.0, NODES + 1)[:-1]
-    theta = limit - (limit - start) * share**3
+    first = max(start, 1.0 / (_FASTEST * rate))
+    theta = 1.0 / (1.0 / limit + (1.0 / first - 1.0 / limit) * share**3)
     half = 0.5 * np.diff(theta)
     cells = half * (inverse(theta[:-1, None] + half[:, None] * (_CELL + 1.0)) @ _CELL_WEIGHTS)
     sigma = np.concatenate([[0.0], np.cumsum(cells)])

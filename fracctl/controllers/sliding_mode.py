@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.interpolate import CubicHermiteSpline
 
 from fracctl.arrays import Floats, batch_size, finite
 from fracctl.compiling import DEMAND, helper_with, pointer_with
@@ -90,8 +91,8 @@ class AdaptiveSlidingMode:
                 if not parameter.contains(float(value)):
                     raise ArgumentError(parameter.name, float(value), parameter.allowed)
         self.gamma = finite("gamma", gamma)
-        if self.gamma.ndim not in (1, 2) or (self.gamma <= 0.0).any():
-            raise ArgumentError("gamma", self.gamma.tolist(), "must hold positive numbers, (m,) or (b, m)")
+        if self.gamma.ndim not in (1, 2) or (self.gamma < 0.0).any():
+            raise ArgumentError("gamma", self.gamma.tolist(), "must hold numbers from 0 on, (m,) or (b, m)")
         self._reference = reference or Approach(components=self.gamma.shape[-1])
         self.batch = batch_size(**{name: (value, 0) for name, value in self._values.items()}, gamma=(self.gamma, 1))
 
@@ -102,7 +103,7 @@ class AdaptiveSlidingMode:
         ``reference_rate`` c > 0 leads it from ``reference_start`` to ``reference_target`` as e^(-ct); 0 is a step.
         """
         gammas = [
-            Parameter(f"gamma_{name}", value, lower=0.0, lower_allowed=False)
+            Parameter(f"gamma_{name}", value, lower=0.0)
             for name, value in zip(components, (1.2, 3.0, 0.9), strict=False)
         ]
         return (*_PARAMETERS, *gammas, *REFERENCE_PARAMETERS)
@@ -154,8 +155,9 @@ class AdaptiveSlidingMode:
         out = np.empty((*auxiliary.shape[:-1], 2))
         for k, phi in enumerate(("phi_1", "phi_2")):
             tables = self._tables(phi, batch).reshape(batch, 3, NODES)
-            for member, (sigma, theta, _) in enumerate(tables):
-                out[member, ..., k] = np.interp(auxiliary[member, ..., k - 2], sigma, theta)
+            for member, (sigma, theta, slope) in enumerate(tables):
+                driven = np.minimum(auxiliary[member, ..., k - 2], sigma[-1])
+                out[member, ..., k] = CubicHermiteSpline(sigma, theta, slope)(driven)
         return out
 
     @property
@@ -229,13 +231,13 @@ def _demand(
     magnitude = square = 0.0
     for i in range(m):
         x, _, wound = _surface(i, error, error_rate, fractional, c, base, peaks, law, z)
-        second = x + math.asin(wound)
-        magnitude += abs(second)
-        square += second * second
+        w[i] = x + math.asin(wound)
+        magnitude += abs(w[i])
+        square += w[i] * w[i]
     z[m] = base[m] + c * magnitude
     z[m + 1] = base[m + 1] + c * square
     first_gain = law[2] * law[3] * looked_up(z[m], law, _HEAD + m)
     second_gain = law[2] * law[4] * looked_up(z[m + 1], law, _HEAD + m + 3 * NODES)
     for i in range(m):
-        x, soft, wound = _surface(i, error, error_rate, fractional, c, base, peaks, law, z)
-        w[i] = -first_gain * min(max((soft + wound) / law[5], -1.0), 1.0) - second_gain * (x + math.asin(wound))
+        _, soft, wound = _surface(i, error, error_rate, fractional, c, base, peaks, law, z)
+        w[i] = -first_gain * min(max((soft + wound) / law[5], -1.0), 1.0) - second_gain * w[i]

@@ -18,19 +18,29 @@ from fracctl.plants.state import Event, StatePlant
 from fracctl.solvers.implicit_memory_kernel import BRACKETED, UNRESOLVED, march
 from fracctl.solvers.members import common_batch, positive
 
-_GROWTH = 1.15
-"""Ratio of the first steps, far below 1 + √2, where BDF2 with growing steps ends to be stable."""
+_GROWTH = 15.0
+"""Share by which the first steps grow, over the largest step: 3 % for 2e-3, so that they are refined as the others."""
+_RUNG = 1.2
+"""Ratio of neighbouring lengths of steps."""
+_LOG_RUNG = float(np.log(_RUNG))
+_MOST_GROWTH = 0.3
+"""Far below √2, where BDF2 with growing steps ends to be stable."""
+_PILOT = 8.0
+"""Steps of the run that tells where longer ones will do, over those of the coarse run."""
+_NEAR, _LONGEST = 4, 10.0
+"""Steps of it to both sides that must be smooth too, and by what steps may be longer at most."""
 _BISECTIONS = 60
 
 
 class ImplicitMemory:
     """BDF2 on a graded mesh, the memory as a sum of exponentials.
 
-    The first steps grow by 15 % each from `first_step` to `step`: a torque on a short tether and a derivative of
-    Riemann and Liouville are both singular at the start. Each step solves for the m rates at its end by Newton's method
-    with differences and, where that does not converge (a control that jumps to the other limit), by bracketing one
-    row after the other, each of which grows with its own rate. The derivative D^ν is that of rates linear in each step:
-    exact in the step itself, by decaying modes before. Error O(step²), away from kinks of the limits.
+    The first steps grow from `first_step` to `step`, by 15 times `step` each: a torque on a short tether and a
+    derivative of Riemann and Liouville are both singular at the start. Each step solves for the m rates at its end by
+    Newton's method with differences, whose derivatives are kept as long as they serve, and where that does not converge
+    (a control that jumps to the other limit) by bracketing one row after the other, each of which grows with its own
+    rate. The derivative D^ν is that of rates linear in each step: exact in the step itself, by decaying modes before.
+    Error O(step²), away from kinks of the limits.
 
     The run is made twice, with `step` and on a mesh with half of each step; the second is returned, and the difference
     is its error estimate, three times too large where the error is regular.
@@ -95,9 +105,11 @@ class ImplicitMemory:
             raise ArgumentError("initial_state", f"of shape {given.shape}", f"must have shape ({n},) or (b, {n})")
         batch = common_batch(loop.batch, len(given) if given.ndim == 2 else None)
         start = np.array(np.broadcast_to(given, (batch, n)))
-        mesh = graded_mesh(self.first_step, self.step, positive("horizon", horizon))
+        horizon = positive("horizon", horizon)
         problem = _Problem(loop, start, self.memory_tolerance)
         with np.errstate(all="ignore"):
+            pilot = problem.on(graded_mesh(self.first_step, _PILOT * self.step, horizon))
+            mesh = graded_mesh(self.first_step, self.step, horizon, _smooth(pilot))
             coarse, fine = problem.on(mesh), problem.on(halved(mesh))
         return self._trajectory(loop, coarse, fine, loop.batch is not None or given.ndim == 2)
 
@@ -136,14 +148,47 @@ class ImplicitMemory:
         )
 
 
-def graded_mesh(first: float, largest: float, horizon: float) -> Floats:
-    """Return times from 0 to the horizon whose steps grow by 15 % each up to equal ones of at most `largest`, (T,)."""
-    growing = first * _GROWTH ** np.arange(1 + int(np.ceil(np.log(largest / first) / np.log(_GROWTH))))
-    times = np.concatenate([[0.0], np.cumsum(growing[growing < largest])])
-    times = times[times < horizon - 0.5 * largest] if horizon > largest else times[times < 0.5 * horizon]
-    left = horizon - times[-1]
-    count = int(np.ceil(left / largest * (1.0 - 1e-12)))
-    return np.concatenate([times, times[-1] + left / count * np.arange(1, count), [horizon]])
+def graded_mesh(first: float, largest: float, horizon: float, longer: tuple[Floats, Floats] | None = None) -> Floats:
+    """Return times from 0 to the horizon: steps that grow, a fifth after some equal ones, up to `largest`.
+
+    Equal steps share what a step is made of, so few lengths are used.
+
+    Args:
+        first: the first step.
+        largest: the last one.
+        horizon: the last time.
+        longer: by what the largest step may be longer from given times on, (k,) each.
+    """
+    equal = max(1, round(np.log(_RUNG) / min(_GROWTH * largest, _MOST_GROWTH)))
+    since, stretch = (longer[0].tolist(), longer[1].tolist()) if longer else ([0.0], [1.0])
+    lowest = -int(np.ceil(np.log(largest / min(first, horizon)) / np.log(_RUNG)))
+    times, t, k, rung, made, last = [0.0], 0.0, 0, lowest, 0, len(since) - 1
+    h = largest * _RUNG**rung
+    while t + 1.5 * h < horizon:
+        t += h
+        times.append(t)
+        made += 1
+        while k < last and since[k + 1] <= t:
+            k += 1
+        highest = int(np.log(stretch[k]) / _LOG_RUNG + 1e-9)
+        if rung > highest:
+            rung, made = highest, 0
+            h = largest * _RUNG**rung
+        elif rung < highest and made >= equal:
+            rung, made = rung + 1, 0
+            h = largest * _RUNG**rung
+    return np.array([*times, horizon])
+
+
+def _smooth(pilot: _Run) -> tuple[Floats, Floats]:
+    """Return by what steps may be longer, and since when, where the rates of all members are smooth."""
+    m = pilot.states.shape[2] // 2
+    rates, h = pilot.states[..., m:], np.diff(pilot.times)
+    slopes = np.diff(rates, axis=1) / h[:, None]
+    bends = np.abs(np.diff(slopes, axis=1)).max(axis=(0, 2)) / (0.5 * (h[1:] + h[:-1]))
+    bends = np.where(np.isfinite(bends), bends, np.inf)
+    near = np.maximum.reduce([np.roll(bends, k) for k in range(-_NEAR, _NEAR + 1)])
+    return pilot.times[1:-1], np.clip(near**-0.5, 1.0, _LONGEST)
 
 
 def halved(mesh: Floats) -> Floats:
@@ -195,7 +240,7 @@ class _Problem:
         orders = self.law.orders(m, batch)
         kernel = sum_of_exponentials(1.0 - orders.ravel(), float(np.diff(mesh).min()), float(mesh[-1]), self.tolerance)
         weights = kernel.weights.reshape(batch, m, -1)
-        wanted, wanted_rate = (np.broadcast_to(v, (batch, count, m)) for v in self.law.reference(mesh))
+        wanted, wanted_rate = (np.array(np.broadcast_to(v, (batch, count, m))) for v in self.law.reference(mesh))
         begins = np.broadcast_to(self.law.initial_memory(self.start[:, :m] - wanted[:, 0]), (batch, m))
         modes = np.repeat(begins[..., None], len(kernel.rates), axis=2)
         first = self.law.initial_auxiliary(batch)
@@ -208,7 +253,7 @@ class _Problem:
         for i in range(batch):
             steps[i] = march(
                 plant.acceleration, self.law.demand, mesh, numbers[i], given[i],
-                np.ascontiguousarray(wanted[i]), np.ascontiguousarray(wanted_rate[i]), orders[i], kernel.rates,
+                wanted[i], wanted_rate[i], orders[i], kernel.rates,
                 weights[i], self.limits[i], modes[i], states[i], memory[i], demands[i], auxiliary[i], how[i],
                 iterations[i],
             )  # fmt: skip

@@ -6,21 +6,20 @@ import math
 from typing import Any
 
 from fracctl.arrays import Floats
-from fracctl.compiling import helper_with
+from fracctl.compiling import called
 
-exact = helper_with(error_model="numpy")
-"""The decorator of functions that only kernels call, whose arithmetic is not reordered."""
 _MOST_ITERATIONS, _MOST_SWEEPS, _MOST_HALVINGS = 12, 60, 200
-_CLOSE = 1e-11
+_CLOSE = 1e-10
 """Change of the rates, relative to 1 + |rate|, at which an iteration ends."""
+_FAST = 0.1
 _STEP_OF_DIFFERENCES = 1e-8
 Q_KNOWN, V_KNOWN, D_KNOWN, D_SHARE, Q_WANTED, V_WANTED, LOWER, UPPER = range(8)
 """Rows of what a step knows of its end: q = Q + c v, v' = (v - V)/c, D = D_K + share Δv, q_d, q_d', control limits."""
-Q, ERROR, ERROR_RATE, D, WANTED, CONTROL, RATE, RESIDUAL = range(8)
+Q, ERROR, ERROR_RATE, D, WANTED, CONTROL, RATE, RESIDUAL, START, KEPT = range(10)
 """Rows of what follows from the rates v at the end of a step."""
 
 
-@exact
+@called
 def respond(
     acceleration: Any,
     demand: Any,
@@ -49,7 +48,7 @@ def respond(
         found[RESIDUAL, i] = v[i] - known[V_KNOWN, i] - c * found[RATE, i]
 
 
-@exact
+@called
 def newton(
     acceleration: Any,
     demand: Any,
@@ -65,33 +64,88 @@ def newton(
     z: Floats,
     matrix: Floats,
 ) -> int:
-    """Solve for the rates v by Newton's method with differences; return the iterations, or -1 if it does not end."""
+    """Solve for the rates v; return the iterations, or their negative number if they do not end.
+
+    Newton's method with the derivatives of an earlier step, whose inverse is in the last columns of `matrix` (m, 2m),
+    and with new ones, by differences, where each iteration does not take nine tenths off the last one.
+    """
+    last = math.inf
+    for iteration in range(_MOST_ITERATIONS):
+        respond(acceleration, demand, t, c, v, known, base, peaks, plant, law, found, z)
+        size = _moved(v, found, matrix)
+        if size <= _CLOSE and size <= _FAST * last and iteration:
+            return iteration + 1
+        if iteration and not size <= _FAST * last:
+            return _with_new_derivatives(
+                acceleration, demand, t, c, v, known, base, peaks, plant, law, found, z, matrix, iteration + 1
+            )
+        if not math.isfinite(size):
+            return _with_new_derivatives(
+                acceleration, demand, t, c, v, known, base, peaks, plant, law, found, z, matrix, iteration + 1
+            )
+        last = size
+    return -_MOST_ITERATIONS
+
+
+@called
+def _with_new_derivatives(
+    acceleration: Any,
+    demand: Any,
+    t: float,
+    c: float,
+    v: Floats,
+    known: Floats,
+    base: Floats,
+    peaks: Floats,
+    plant: Floats,
+    law: Floats,
+    found: Floats,
+    z: Floats,
+    matrix: Floats,
+    before: int,
+) -> int:
+    """Solve for the rates v with derivatives of each iteration; count those before, too."""
     m = len(v)
+    for i in range(m):
+        v[i] = found[START, i]
     for iteration in range(_MOST_ITERATIONS):
         respond(acceleration, demand, t, c, v, known, base, peaks, plant, law, found, z)
         for i in range(m):
-            matrix[i, m] = found[RESIDUAL, i]
+            found[KEPT, i] = found[RESIDUAL, i]
         for j in range(m):
             kept = v[j]
             v[j] = kept + _STEP_OF_DIFFERENCES * (1.0 + abs(kept))
             respond(acceleration, demand, t, c, v, known, base, peaks, plant, law, found, z)
             for i in range(m):
-                matrix[i, j] = (found[RESIDUAL, i] - matrix[i, m]) / (v[j] - kept)
+                matrix[i, j] = (found[RESIDUAL, i] - found[KEPT, i]) / (v[j] - kept)
+                matrix[i, m + j] = 1.0 if i == j else 0.0
             v[j] = kept
-        if not _eliminated(matrix):
-            return -1
-        close = True
         for i in range(m):
-            close = close and abs(matrix[i, m]) <= _CLOSE * (1.0 + abs(v[i]))
-            v[i] -= matrix[i, m]
-        if close:
-            return iteration + 1
-    return -1
+            found[RESIDUAL, i] = found[KEPT, i]
+        if not _inverted(matrix):
+            return -before - iteration - 1
+        if _moved(v, found, matrix) <= _CLOSE:
+            return before + iteration + 1
+    return -before - _MOST_ITERATIONS
 
 
-@exact
-def _eliminated(matrix: Floats) -> bool:
-    """Solve the equations (m, m + 1) in place, the solution in the last column; False if they are singular."""
+@called
+def _moved(v: Floats, found: Floats, matrix: Floats) -> float:
+    """Take the inverse times the residual off v; return the largest change relative to 1 + |v|."""
+    m, largest = len(v), 0.0
+    for i in range(m):
+        change = 0.0
+        for j in range(m):
+            change += matrix[i, m + j] * found[RESIDUAL, j]
+        v[i] -= change
+        if not abs(change) <= largest * (1.0 + abs(v[i])):
+            largest = abs(change) / (1.0 + abs(v[i]))
+    return largest
+
+
+@called
+def _inverted(matrix: Floats) -> bool:
+    """Lead the first columns of a matrix (m, 2m) to those of the identity; False if they are singular."""
     m = len(matrix)
     for k in range(m):
         pivot = k
@@ -99,20 +153,22 @@ def _eliminated(matrix: Floats) -> bool:
             if abs(matrix[i, k]) > abs(matrix[pivot, k]):
                 pivot = i
         if not abs(matrix[pivot, k]) > 0.0 or not math.isfinite(matrix[pivot, k]):
+            matrix[0, m] = math.nan
             return False
-        for j in range(m + 1):
+        for j in range(2 * m):
             matrix[k, j], matrix[pivot, j] = matrix[pivot, j], matrix[k, j]
+        scale = 1.0 / matrix[k, k]
+        for j in range(2 * m):
+            matrix[k, j] *= scale
         for i in range(m):
             if i != k:
-                factor = matrix[i, k] / matrix[k, k]
-                for j in range(k, m + 1):
+                factor = matrix[i, k]
+                for j in range(2 * m):
                     matrix[i, j] -= factor * matrix[k, j]
-    for k in range(m):
-        matrix[k, m] /= matrix[k, k]
     return True
 
 
-@exact
+@called
 def _residual_at(
     acceleration: Any,
     demand: Any,
@@ -136,7 +192,7 @@ def _residual_at(
     return residual
 
 
-@exact
+@called
 def bracketed(
     acceleration: Any,
     demand: Any,

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
-import numba
 import numpy as np
+from numba import types
 
 from fracctl.arrays import Array, Floats
-from fracctl.compiling import ACCELERATION, DEMAND, compiled_with
+from fracctl.compiling import ACCELERATION, DEMAND, called, helper, pointer_with
 from fracctl.solvers.implicit_memory_equations import (
     D_KNOWN,
     D_SHARE,
@@ -16,6 +17,7 @@ from fracctl.solvers.implicit_memory_equations import (
     LOWER,
     Q_KNOWN,
     Q_WANTED,
+    START,
     UPPER,
     V_KNOWN,
     V_WANTED,
@@ -23,7 +25,6 @@ from fracctl.solvers.implicit_memory_equations import (
     D,
     Q,
     bracketed,
-    exact,
     newton,
     respond,
 )
@@ -32,9 +33,18 @@ NEWTON, BRACKETED, UNRESOLVED = 0, 1, 2
 """How the equations of a step were solved: by Newton's method, by bracketing each row in turn, or not."""
 _SMALL = 1e-3
 """Below it, exponentials are replaced by their series."""
+_ROW, _ROWS = types.f8[::1], types.f8[:, ::1]
+_MARCH = types.i8(
+    types.FunctionType(ACCELERATION),
+    types.FunctionType(DEMAND),
+    *(_ROW, _ROW, _ROW, _ROWS, _ROWS, _ROW, _ROW),
+    *[_ROWS] * 7,
+    types.i1[::1],
+    types.i4[::1],
+)
 
 
-@exact
+@called
 def _filters(rates: Floats, h: float, decay: Floats, early: Floats, late: Floats) -> None:
     """Fill what a mode keeps over a step, and what it takes of a rate at its start and end that is linear between."""
     for j in range(len(rates)):
@@ -49,10 +59,25 @@ def _filters(rates: Floats, h: float, decay: Floats, early: Floats, late: Floats
             late[j] = (1.0 - mean) / s
 
 
-@exact
+@helper
+def _remembered(weights: Floats, decay: Floats, modes: Floats) -> float:
+    """Return what the modes of one component will give at the end of a step."""
+    total = 0.0
+    for j in range(len(decay)):
+        total += weights[j] * decay[j] * modes[j]
+    return total
+
+
+@helper
+def _lead(modes: Floats, decay: Floats, early: Floats, late: Floats, first: float, last: float) -> None:
+    """Lead the modes of one component over a step with the rates at its start and end."""
+    for j in range(len(decay)):
+        modes[j] = decay[j] * modes[j] + early[j] * first + late[j] * last
+
+
+@called
 def _known_of_the_end(
     n: int,
-    h: float,
     ratio: float,
     states: Floats,
     reference: Floats,
@@ -63,7 +88,7 @@ def _known_of_the_end(
     modes: Floats,
     known: Floats,
 ) -> None:
-    """Fill `known` for the step from n to n + 1."""
+    """Fill `known`, but for the limits and D's share, for the step from n to n + 1."""
     m, earlier = len(orders), max(n - 1, 0)
     one, two = _before(ratio)
     for i in range(m):
@@ -71,22 +96,18 @@ def _known_of_the_end(
         known[V_KNOWN, i] = one * states[n, m + i] - two * states[earlier, m + i]
         known[Q_WANTED, i] = reference[n + 1, i]
         known[V_WANTED, i] = reference_rate[n + 1, i]
-        past = 0.0
-        for j in range(len(decay)):
-            past += weights[i, j] * decay[j] * modes[i, j]
-        share = h ** (1.0 - orders[i]) / math.gamma(3.0 - orders[i])
-        known[D_KNOWN, i] = past + share * (1.0 - orders[i]) * (states[n, m + i] - reference_rate[n, i])
-        known[D_SHARE, i] = share
+        past = _remembered(weights[i], decay, modes[i])
+        known[D_KNOWN, i] = past + known[D_SHARE, i] * (1.0 - orders[i]) * (states[n, m + i] - reference_rate[n, i])
 
 
-@exact
+@called
 def _before(ratio: float) -> tuple[float, float]:
     """Return what the last two values add to one, and take from it, in a step `ratio` times as long as the last."""
     lead = (1.0 + 2.0 * ratio) / (1.0 + ratio)
     return (1.0 + ratio) / lead, ratio * ratio / (1.0 + ratio) / lead
 
 
-@exact
+@called
 def _taken(
     n: int,
     v: Floats,
@@ -110,18 +131,17 @@ def _taken(
         memory[n + 1, i], demands[n + 1, i] = found[D, i], found[WANTED, i]
         finite = finite and math.isfinite(found[Q, i]) and math.isfinite(v[i])
         before = states[n, m + i] - reference_rate[n, i]
-        for j in range(len(decay)):
-            modes[i, j] = decay[j] * modes[i, j] + early[j] * before + late[j] * found[ERROR_RATE, i]
+        _lead(modes[i], decay, early, late, before, found[ERROR_RATE, i])
     for k in range(len(z)):
         auxiliary[n + 1, k] = z[k]
         peaks[k] = max(peaks[k], abs(z[k]))
     return finite
 
 
-@compiled_with(error_model="numpy")
+@pointer_with(_MARCH)
 def march(
-    acceleration: numba.types.FunctionType(ACCELERATION),  # type: ignore[valid-type]
-    demand: numba.types.FunctionType(DEMAND),  # type: ignore[valid-type]
+    acceleration: Any,
+    demand: Any,
     times: Floats,
     plant: Floats,
     law: Floats,
@@ -165,22 +185,30 @@ def march(
         The number of steps taken before a state was no number.
     """
     m = len(orders)
-    known, found = np.empty((8, m)), np.zeros((8, m))
+    known, found = np.empty((8, m)), np.zeros((10, m))
     known[LOWER], known[UPPER] = limits[0], limits[1]
     z, base, peaks = np.empty(auxiliary.shape[1]), np.empty(auxiliary.shape[1]), np.abs(auxiliary[0])
-    v, matrix = np.empty(m), np.empty((m, m + 1))
+    v, matrix = np.empty(m), np.full((m, 2 * m), np.nan)
     decay, early, late = np.empty(len(rates)), np.empty(len(rates)), np.empty(len(rates))
     h = 0.0
     for n in range(len(times) - 1):
         ratio, h = (times[n + 1] - times[n]) / h if n else 0.0, times[n + 1] - times[n]
         if abs(ratio - 1.0) > 1e-12:
             _filters(rates, h, decay, early, late)
-        _known_of_the_end(n, h, ratio, states, reference, reference_rate, orders, weights, decay, modes, known)
+            for i in range(m):
+                known[D_SHARE, i] = h ** (1.0 - orders[i]) / math.gamma(3.0 - orders[i])
+        _known_of_the_end(n, ratio, states, reference, reference_rate, orders, weights, decay, modes, known)
         one, two = _before(ratio)
         for k in range(len(z)):
             base[k] = one * auxiliary[n, k] - two * auxiliary[max(n - 1, 0), k]
         for i in range(m):
-            v[i] = states[n, m + i] + (ratio * (states[n, m + i] - states[n - 1, m + i]) if n > 1 else 0.0)
+            v[i] = states[n, m + i]
+            if n > 2:
+                slope = (v[i] - states[n - 1, m + i]) / (times[n] - times[n - 1])
+                earlier = (states[n - 1, m + i] - states[n - 2, m + i]) / (times[n - 1] - times[n - 2])
+                bend = (slope - earlier) / (times[n] - times[n - 2])
+                v[i] += h * (slope + (times[n + 1] - times[n - 1]) * bend)
+        found[START] = v
         t, c = times[n + 1], h * (1.0 + ratio) / (1.0 + 2.0 * ratio)
         count = newton(acceleration, demand, t, c, v, known, base, peaks, plant, law, found, z, matrix)
         how[n], iterations[n] = NEWTON, abs(count)
