@@ -1,11 +1,13 @@
 """Measures of performance, each a function of a batch of trajectories."""
 
-from fracctl.measures.base import Measure, StepwiseMeasure
+from fracctl.measures.base import Measure, MeshMeasure, StepwiseMeasure
 from fracctl.measures.boundedness import Boundedness, largest_distance
 from fracctl.measures.control_effort import ControlEffort, control_effort
 from fracctl.measures.delta_v import delta_v
 from fracctl.measures.delta_v_per_orbit import DeltaVPerOrbit, delta_v_per_orbit
 from fracctl.measures.drift_per_orbit import DriftPerOrbit, drift_per_orbit
+from fracctl.measures.length_overshoot import LengthOvershoot, length_overshoot
+from fracctl.measures.length_settling import LengthSettling, length_settling
 from fracctl.measures.overshoot import Overshoot, overshoot
 from fracctl.measures.peak_acceleration import PeakAcceleration, peak_acceleration
 from fracctl.measures.periodicity_error import PeriodicityError, periodicity_error
@@ -17,7 +19,10 @@ __all__ = [
     "ControlEffort",
     "DeltaVPerOrbit",
     "DriftPerOrbit",
+    "LengthOvershoot",
+    "LengthSettling",
     "Measure",
+    "MeshMeasure",
     "Overshoot",
     "PeakAcceleration",
     "PeriodicityError",
@@ -29,6 +34,8 @@ __all__ = [
     "delta_v_per_orbit",
     "drift_per_orbit",
     "largest_distance",
+    "length_overshoot",
+    "length_settling",
     "overshoot",
     "peak_acceleration",
     "periodicity_error",

@@ -1,0 +1,49 @@
+"""Settling and overshoot of the two angles of a tether."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fracctl.arrays import Floats
+from fracctl.errors import ArgumentError
+from fracctl.measures.mesh_cubics import cubics
+from fracctl.measures.tethers import targets, tether_of
+from fracctl.meshwise import MeshTrajectory
+
+
+class AngleSettling:
+    """When the in-plane and out-of-plane angles come within a threshold of their targets for good, and how far past.
+
+    Settling is f/2π of the last crossing, +inf where an angle is outside at the horizon or the member ended before.
+    The overshoot, in radians, is the largest excursion to the side opposite to the start, to either side where that is
+    the target, up to a member's end. Both on the cubics between the times of the mesh.
+
+    Args:
+        threshold: in radians; 0.002 is 2 % of the angles that the deployments of Zhong et al. begin with.
+
+    Raises:
+        ArgumentError: the threshold is not positive.
+    """
+
+    name = "angle_settling"
+    columns = ("theta_settling_orbits", "phi_settling_orbits", "theta_overshoot_rad", "phi_overshoot_rad")
+
+    def __init__(self, threshold: float = 0.002) -> None:
+        if not 0.0 < threshold < np.inf:
+            raise ArgumentError("threshold", threshold, "must be positive")
+        self.threshold = float(threshold)
+
+    def __call__(self, trajectory: MeshTrajectory) -> dict[str, Floats]:
+        """Return columns ``theta_settling_orbits``, ``phi_settling_orbits`` and the two overshoots, (b,) each.
+
+        Raises:
+            UnsupportedError: the plant is no tether.
+        """
+        tether_of(trajectory, self.name)
+        centre = targets(trajectory)
+        settled, past = [], []
+        for angle in (1, 2):
+            distance = cubics(trajectory, angle, centre[:, angle])
+            settled.append(distance.last_crossing(np.full(len(centre), self.threshold)) / (2.0 * np.pi))
+            past.append(distance.largest(-np.sign(trajectory.on_mesh[:, 0, angle] - centre[:, angle])))
+        return dict(zip(self.columns, [*settled, *past], strict=True))
