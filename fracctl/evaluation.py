@@ -144,6 +144,16 @@ class Evaluation:
         return self.solver.solve(self.loop(design), state, horizon or self.horizon)
 
     @property
+    def sliced_by(self) -> str | None:
+        """The one of the `axes` for each value of which an optimum is kept, where the survey names none."""
+        return None
+
+    @property
+    def trajectory_kinds(self) -> tuple[str, ...]:
+        """Kinds of optima whose trajectories are stored."""
+        return ("overall", "baseline")
+
+    @property
     def trajectory_samples(self) -> int:
         """How many times of a trajectory are stored, uniform from 0 to the horizon."""
         return 2001

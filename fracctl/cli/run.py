@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from fracctl.cli import output
 from fracctl.cli.comparison import comparison_lines
 from fracctl.cli.failure import report, sentence
+from fracctl.cli.laws import law_lines, quantile_lines
 from fracctl.cli.parser import Parser
 from fracctl.cli.table import ResultTable
 from fracctl.errors import ConfigurationError, FracctlError
@@ -159,10 +160,14 @@ def _show(summary: dict[str, Any], job: _Job, options: argparse.Namespace) -> No
 
 
 def _lines(summary: dict[str, Any], config: RunConfig) -> list[str]:
-    compared = summary.get("tables", {}).get("comparison")
-    if compared is None:
-        return _table(config).lines(summary)
-    return comparison_lines(compared, config.objectives[config.objective] == ["settling_time"])
+    tables = summary.get("tables", {})
+    if "comparison" in tables:
+        return comparison_lines(tables["comparison"], config.objectives[config.objective] == ["settling_time"])
+    if "laws" in tables:
+        return law_lines(tables["laws"])
+    if "quantiles" in tables:
+        return quantile_lines(tables["quantiles"])
+    return _table(config).lines(summary)
 
 
 def _table(config: RunConfig) -> ResultTable:

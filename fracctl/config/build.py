@@ -16,7 +16,9 @@ from fracctl.config.messages import InvalidConfiguration, problems
 from fracctl.config.options import construct
 from fracctl.config.schemas import AccuracyEvaluation, ComparisonEvaluation, GridSurvey, RunConfig, SingleSurvey
 from fracctl.config.schemas import DelayedEvaluation as DelayedOptions
+from fracctl.config.schemas import MemoryEvaluation as MemoryOptions
 from fracctl.controllers import Saturation
+from fracctl.dispersions import Distribution
 from fracctl.errors import ArgumentError, ConfigurationError
 from fracctl.evaluation import Evaluation
 from fracctl.measures.base import TRAJECTORIES, trajectories_of
@@ -55,6 +57,8 @@ def build_evaluation(config: RunConfig) -> Evaluation:
     }
     if isinstance(config.evaluation, DelayedOptions):
         return _delayed(config.evaluation, common)
+    if isinstance(config.evaluation, MemoryOptions):
+        return _memory(config.evaluation, config.seed, common)
     return Evaluation(**common)
 
 
@@ -67,6 +71,19 @@ def _delayed(given: DelayedOptions, common: Mapping[str, Any]) -> Evaluation:
     except ArgumentError as error:
         cure = f"; {error.instead}" if error.instead else ""
         raise ConfigurationError(f"{error.name} = {error.value}: {error.allowed}{cure}") from error
+
+
+def _memory(given: MemoryOptions, seed: int, common: Mapping[str, Any]) -> Evaluation:
+    from fracctl.memory_evaluation import MemoryEvaluation, NamedLaw  # loads the solver
+
+    laws = {name: NamedLaw(registry.load("controllers", law.type), law.values) for name, law in given.laws.items()}
+    dispersions = {name: Distribution.of(numbers) for name, numbers in given.dispersions.items()}
+    options = {"laws": laws, "dispersions": dispersions, "samples": given.samples, "first_sample": given.first_sample}
+    nothing: dict[str, Any] = {"objectives": {}, "objective": ""} if dispersions else {}
+    try:
+        return MemoryEvaluation(**{**common, **nothing}, **options, seed=seed)  # type: ignore[arg-type]
+    except ArgumentError as error:
+        raise ConfigurationError(f"evaluation.{error.name} = {error.value}: {error.allowed}") from error
 
 
 def _comparison(config: RunConfig, given: ComparisonEvaluation, common: Mapping[str, Any]) -> Evaluation:
@@ -102,7 +119,7 @@ def build_survey(config: RunConfig, evaluation: Evaluation) -> Survey:
         grid = survey if isinstance(survey, GridSurvey) else GridSurvey(type="grid", axes={})
         axes = {name: axis_values(spec, name) for name, spec in grid.axes.items()} | dict(evaluation.axes)
         fixed = {name: parameters[name] for name in evaluation.design_variables if name not in axes}
-        return Grid(axes, grid.slice, grid.baseline, fixed)
+        return Grid(axes, grid.slice or evaluation.sliced_by, grid.baseline, fixed)
     factory = registry.load("surveys", survey.type)
     try:
         built: Survey = construct(factory, survey, evaluation=evaluation, seed=config.seed)

@@ -12,7 +12,8 @@ from pydantic_core import InitErrorDetails
 from fracctl.config import parts
 from fracctl.config.fields import Folder, Name, Number, Strict, Typed, Whole, refusal, refuse
 from fracctl.config.options import factory_of
-from fracctl.errors import suggestion
+from fracctl.dispersions import Distribution
+from fracctl.errors import ArgumentError, suggestion
 
 _COLUMN = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
@@ -67,6 +68,44 @@ class DelayedEvaluation(Typed):
     """What the thrusters can give, dimensionless; None for any."""
     largest_by: Literal["norm", "axis"] = "norm"
     """Whether that limits the magnitude or each component."""
+
+
+class NamedLaw(Typed):
+    """A law among several."""
+
+    values: dict[str, Number] = Field(default_factory=dict)
+    """Values of its parameters; their defaults where none are given."""
+
+
+def _named_law(value: NamedLaw) -> NamedLaw:
+    factory_of("controllers", value.model_dump())
+    return value
+
+
+def _dispersions(value: dict[str, list[Any]]) -> dict[str, list[Any]]:
+    lines = []
+    for name, given in value.items():
+        try:
+            Distribution.of(given)
+        except ArgumentError as error:
+            lines.append(refusal((name,), given, error.allowed))
+    if lines:
+        raise refuse(*lines)
+    return value
+
+
+class MemoryEvaluation(Typed):
+    """Runs of laws with a memory in the loop."""
+
+    type: Literal["memory"]
+    laws: dict[str, Annotated[NamedLaw, AfterValidator(_named_law)]] = Field(default_factory=dict)
+    """Laws that are run one after the other, by the names they have in tables; none for `controller`."""
+    dispersions: Annotated[dict[str, list[Any]], AfterValidator(_dispersions)] = Field(default_factory=dict)
+    """Distributions by what is uncertain: ``[normal, mean, deviation]``, ``[uniform, from, to]``, ``[choice, …]``."""
+    samples: Annotated[Whole, Field(ge=1)] = 200
+    """How many are drawn where there are distributions."""
+    first_sample: Annotated[Whole, Field(ge=0)] = 0
+    """Number of the first."""
 
 
 class ComparedLaw(Typed):
@@ -136,11 +175,16 @@ class Figure(Typed):
         "feedback",
         "drift",
         "multiplier_window",
+        "deployment",
+        "settling_against_overshoot",
+        "spread",
     ]
     objective: str | None = None
     """Whose optima are shown; None for the primary one."""
     initial_conditions: list[str] | None = None
     """Which are shown; None for all."""
+    shows: str | None = None
+    """What figures that can show several things show."""
 
 
 SURVEYS: Mapping[str, type[Typed]] = {"single": SingleSurvey, "grid": GridSurvey}
@@ -149,6 +193,7 @@ EVALUATIONS: Mapping[str, type[Typed]] = {
     "accuracy": AccuracyEvaluation,
     "comparison": ComparisonEvaluation,
     "delayed": DelayedEvaluation,
+    "memory": MemoryEvaluation,
 }
 SCHEDULERS: Mapping[str, type[Typed]] = {"serial": SerialScheduler, "local": LocalScheduler}
 

@@ -34,8 +34,6 @@ from fracctl.store.identity import canonical_json
 from fracctl.store.run_directory import RunDirectory
 from fracctl.surveys import Optima, Survey
 
-TRAJECTORY_KINDS = ("overall", "baseline")
-
 _log = logging.getLogger(__name__)
 
 
@@ -199,7 +197,7 @@ class Computation:
 
     def _trajectories(self) -> None:
         optima = self._directory.optima()
-        shown = optima[optima["kind"].isin(TRAJECTORY_KINDS)]
+        shown = optima[optima["kind"].isin(self._evaluation.trajectory_kinds)]
         times = np.linspace(0.0, self._evaluation.horizon, self._evaluation.trajectory_samples)
         rows = trajectories(self._evaluation, shown, times)
         self._directory.write_trajectories(schema(tuple(rows), metadata=self._metadata), rows)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Sequence
 
@@ -74,6 +75,8 @@ class Tether(SecondOrder):
     scales = None
     period = 2.0 * math.pi
     acceleration = staticmethod(_acceleration)
+    dispersed = ("disturbance_phase", "disturbance_factor")
+    """What `dispersed_by` takes."""
 
     def __init__(
         self,
@@ -159,6 +162,15 @@ class Tether(SecondOrder):
 
     def _force_n(self, f: ArrayLike) -> Floats:
         return self.reduced_mass_kg * self.rate_rad_s(f) ** 2 * self.length_m
+
+    def dispersed_by(self, disturbance_phase: ArrayLike = 0.0, disturbance_factor: ArrayLike = 1.0) -> Tether:
+        """Return the tether with disturbances d_i factor sin(f + phase) of b members, () or (b,) each, in rad and 1."""
+        phase, factor = finite("disturbance_phase", disturbance_phase), finite("disturbance_factor", disturbance_factor)
+        other = copy.copy(self)
+        e, rho, *disturbance, own_phase = self._parameters.T
+        amplitudes = np.stack(disturbance, axis=-1) * factor.reshape(-1, 1)
+        other._parameters = _parameters(float(e[0]), float(rho[0]), amplitudes, own_phase + phase.ravel())
+        return other
 
     def kernel_parameters(self, batch: int) -> Floats:
         """Return the parameters of `acceleration` for each member of a batch, [e, ρ, d, phase], (b, 6).

@@ -19,10 +19,20 @@ SIGMA, W = "sigma", "w"
 
 TEXT = (
     *("variable", "initial_condition", "status", REASON, "kind", "objective_name", "solver", SEARCHED_FOR),
-    *("law", "part", "limit", "verdict", "found_by", "found_for"),
+    *("law", "part", "limit", "verdict", "found_by", "found_for", "measure"),
 )
 """Columns that hold words."""
-_WHOLE = (POINT, "run", EVALUATIONS_SPENT, "principal_poles", "denominator")
+_WHOLE = (
+    POINT,
+    "sample",
+    "samples",
+    "smallest_sample",
+    "largest_sample",
+    "run",
+    EVALUATIONS_SPENT,
+    "principal_poles",
+    "denominator",
+)
 _FLAGS = ("stable", "all_poles_found")
 _UNITS = {
     "seconds_per_trajectory": "s",
