@@ -8,6 +8,14 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 _MEASURES = {
+    "alpha_0": ("", r"\alpha_0"),
+    "alpha_1": ("", r"\alpha_1"),
+    "nu": ("", r"\nu"),
+    "reference_rate": ("", "c"),
+    "caputo": ("", r"\mathrm{Caputo}"),
+    "settling_2_percent_orbits": ("Settling to 2 % (orbits)", ""),
+    "settling_5_percent_orbits": ("Settling to 5 % (orbits)", ""),
+    "overshoot_percent": ("Overshoot (%)", ""),
     "beta": ("Weight of the control", r"\beta"),
     "recall": ("Recall", "R"),
     "delay": ("Delay", r"\tau"),

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 
 from fracctl.errors import ConfigurationError, FracctlError, suggestion
 from fracctl.figures import (
+    deployment,
     drift,
     feedback,
     gain_contours,
@@ -23,6 +24,8 @@ from fracctl.figures import (
     poles,
     settling_against_band,
     settling_against_effort,
+    settling_against_overshoot,
+    spread,
     trajectories,
     work_precision,
 )
@@ -45,6 +48,9 @@ TYPES: Mapping[str, Callable[[Results, Selection], tuple[Figure, pd.DataFrame]]]
     "feedback": feedback.build,
     "drift": drift.build,
     "multiplier_window": multiplier_window.build,
+    "deployment": deployment.build,
+    "settling_against_overshoot": settling_against_overshoot.build,
+    "spread": spread.build,
 }
 """Type in the configuration to the function that makes the figure and the table behind it."""
 

@@ -34,7 +34,8 @@ _DESIGN = (
     "adapt",
 )
 """What columns of design variables begin with."""
-_IN_ORBIT = ("libration", "relative_motion", "perturbed_relative_motion")
+_OPTIONS = ("objective", "initial_conditions", "shows")
+_IN_ORBIT = ("tether", "libration", "relative_motion", "perturbed_relative_motion")
 """Plants whose time 2π is an orbit."""
 
 
@@ -146,6 +147,8 @@ class Selection:
     """Measures whose geometric mean it is."""
     initial_conditions: tuple[str, ...]
     """Names, in the order of the rows of the figure."""
+    shows: str | None = None
+    """What figures that can show several things show; None for what they show by themselves."""
 
     @property
     def value_column(self) -> str:
@@ -154,21 +157,21 @@ class Selection:
 
 
 def select(results: Results, options: Mapping[str, Any]) -> Selection:
-    """Read the options `objective` (default: the primary one) and `initial_conditions` (default: all).
+    """Read the options `objective` (default: the primary one), `initial_conditions` (default: all) and `shows`.
 
     Raises:
         ConfigurationError: an option or a name is unknown.
     """
     for key in options:
-        if key not in ("objective", "initial_conditions"):
-            raise ConfigurationError(f"unknown option '{key}'{suggestion(key, ('objective', 'initial_conditions'))}")
+        if key not in _OPTIONS:
+            raise ConfigurationError(f"unknown option '{key}'{suggestion(key, _OPTIONS)}")
     objectives = results.configuration["objectives"]
     objective = options.get("objective") or results.configuration["objective"]
     _known("objective", [objective], objectives)
     present = list(results.configuration["initial_condition"])
     asked = options.get("initial_conditions") or present
     _known("initial condition", asked, present)
-    return Selection(objective, tuple(objectives[objective]), tuple(asked))
+    return Selection(objective, tuple(objectives[objective]), tuple(asked), options.get("shows"))
 
 
 def optimum(results: Results, selection: Selection, initial_condition: str, kind: str) -> Row | None:

@@ -1,0 +1,77 @@
+"""How measures of a dispersed run are distributed."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from fracctl.figures import labels
+from fracctl.figures.results import FigureError, Results, Selection
+from fracctl.figures.style import CYCLE, FULL_WIDTH_IN, GREY
+
+_PANEL_HEIGHT_IN = 2.3
+_ABREAST = 3
+_MOST = 6
+
+
+def build(results: Results, selection: Selection) -> tuple[Figure, pd.DataFrame]:
+    """Draw the share of samples up to each value, a panel for each measure and a curve for each law and start.
+
+    The option `shows` names measures, separated by commas; the first six that vary without it. Samples without a
+    finite value are missing at the top of a curve.
+
+    Raises:
+        FigureError: the run is not dispersed, or has no such measure.
+    """
+    rows = results.evaluations
+    if "sample" not in rows:
+        raise FigureError("the run is not dispersed")
+    measures = _measures(results, selection)
+    groups = ["initial_condition", *(["law"] if "law" in rows else [])]
+    own = rows[rows["initial_condition"].isin(selection.initial_conditions)]
+    lines = -(-len(measures) // _ABREAST)
+    width = min(_ABREAST, len(measures))
+    figure = Figure(figsize=(FULL_WIDTH_IN, _PANEL_HEIGHT_IN * lines + 0.3), layout="constrained")
+    axes = figure.subplots(lines, width, squeeze=False, sharey=True).ravel()
+    for ax, measure in zip(axes, measures, strict=False):
+        for colour, (key, part) in zip(CYCLE, own.groupby(groups, sort=False), strict=False):
+            _steps(ax, part[measure].to_numpy(float), colour, _name(key, len(selection.initial_conditions)))
+        ax.axhline(0.95, color=GREY, linewidth=0.4, linestyle=":")
+        ax.set_xlabel(labels.objective([measure]))
+    for ax in axes[len(measures) :]:
+        ax.set_axis_off()
+    for ax in axes[::width]:
+        ax.set_ylabel("Share of samples")
+    handles, names = axes[0].get_legend_handles_labels()
+    figure.legend(handles, names, loc="outside lower center", ncols=min(len(names), 4))
+    return figure, own[["sample", *groups, *measures]].reset_index(drop=True)
+
+
+def _measures(results: Results, selection: Selection) -> list[str]:
+    rows = results.evaluations
+    if selection.shows:
+        wanted = [name.strip() for name in selection.shows.split(",")]
+        if missing := [name for name in wanted if name not in rows]:
+            raise FigureError(f"the run does not measure {', '.join(missing)}")
+        return wanted
+    after = list(rows.columns).index("sample") + 1
+    numbers = rows.columns[after:]
+    drawn = set(results.configuration["evaluation"].get("dispersions", {})) | {"error_estimate", "nodes"}
+    varying = [n for n in numbers if n not in drawn and rows[n].dtype == float and rows[n].nunique() > 2]
+    if not varying:
+        raise FigureError("no measure of the run varies")
+    return varying[:_MOST]
+
+
+def _steps(ax: Axes, values: np.ndarray, colour: str, name: str) -> None:
+    finite = np.sort(values[np.isfinite(values)])
+    shares = np.arange(1, len(finite) + 1) / max(len(values), 1)
+    ax.step(finite, shares, where="post", color=colour, linewidth=1.0, label=name)
+
+
+def _name(key: object, starts: int) -> str:
+    parts = [str(part) for part in key] if isinstance(key, tuple) else [str(key)]
+    start = [labels.initial_condition(parts[0])] if starts > 1 or len(parts) == 1 else []
+    return ", ".join([*parts[1:], *start])
