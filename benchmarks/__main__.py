@@ -16,7 +16,7 @@ from pathlib import Path
 import pandas as pd
 from matplotlib.figure import Figure
 
-from benchmarks import comparison, delays, figures, machine, processes, report, throughput, work_precision
+from benchmarks import comparison, delays, figures, machine, processes, report, tethers, throughput, work_precision
 from benchmarks.verdicts import Verdict
 
 FOLDER = Path("outputs/bench")
@@ -25,6 +25,7 @@ SECTIONS = {
     "comparison": "The engine and its peers, one core, each at its own error",
     "work_precision": "The project's solvers, error and time per trajectory",
     "delays": "Delayed feedback and jitcdde, one core, each at its own error",
+    "tethers": "A tether under FDA-SMC and SciPy's stiff integrators, one core, each at its own error",
     "processes": "Start-up, whole runs, memory",
 }
 
@@ -65,6 +66,8 @@ def _measured(name: str) -> tuple[pd.DataFrame, list[Verdict], list[str]]:
             return comparison.measure()
         if name == "delays":
             return delays.measure()
+        if name == "tethers":
+            return tethers.measure()
         return work_precision.measure(), [], []
 
 
