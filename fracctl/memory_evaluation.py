@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -24,6 +24,8 @@ LAWS, QUANTILES = "laws", "quantiles"
 """Names of the tables."""
 AT_ONCE = 32
 """Runs that are solved together; each holds some 3 MB."""
+MOST_BESIDE = 8
+"""Points from each start that are shown beside each other."""
 SAMPLES_IN_PERIOD = 1000
 """Of a stored trajectory, in 2π of time."""
 _INITIAL = "initial_"
@@ -204,7 +206,7 @@ class MemoryEvaluation(Evaluation):
     @property
     def trajectory_kinds(self) -> tuple[str, ...]:
         """Kinds of optima whose trajectories are stored."""
-        return ("slice",) if self.laws else super().trajectory_kinds
+        return ("slice",) if self.laws else ("slice", *super().trajectory_kinds)
 
     @property
     def sampled_columns(self) -> tuple[str, ...]:
@@ -217,28 +219,42 @@ class MemoryEvaluation(Evaluation):
         return dict(zip(self.sampled_columns, samples.T, strict=True))
 
     def conclude(self, parts: Iterable[Mapping[str, Array]]) -> Conclusion:
-        """Return quantiles of a dispersed run, else a table of the laws."""
-        if not (self.dispersed or self.laws):
-            return Conclusion()
+        """Return quantiles of a dispersed run, a table of the laws or points if there are few; and why runs ended."""
         rows = joined(list(parts))
         measured = [column for measure in self.measures for column in measure.columns]
-        named = ["initial_condition", *([LAW] if self.laws else [])]
-        if not self.dispersed:
-            columns = [*named, *measured, "status"]
-            records = [
-                dict(zip(columns, row, strict=True)) for row in zip(*(rows[c].tolist() for c in columns), strict=True)
-            ]
-            return Conclusion({LAWS: records}, {LAWS: records})
         varied = [name for name in self.design_variables if name != NUMBER and np.unique(rows[name]).size > 1]
-        records = list(spreads(rows, [*named, *varied], measured))
-        return Conclusion({QUANTILES: records}, {QUANTILES: records}, tuple(self._notes(rows, named)))
+        notes = list(self._endings(rows))
+        if self.dispersed:
+            groups = ["initial_condition", *([LAW] if self.laws else []), *varied]
+            records = list(spreads(rows, groups, measured))
+            return Conclusion({QUANTILES: records}, {QUANTILES: records}, (*self._notes(rows, groups), *notes))
+        if len(rows["status"]) > MOST_BESIDE * len(self.initial_conditions) or not (self.laws or varied):
+            return Conclusion(notes=tuple(notes))
+        names = rows[LAW].tolist() if self.laws else _labels(rows, varied)
+        columns = {"initial_condition": rows["initial_condition"], LAW: names}
+        columns |= {name: rows[name] for name in (*measured, "status")}
+        values = zip(*(list(np.asarray(c, dtype=object)) for c in columns.values()), strict=True)
+        records = [dict(zip(columns, row, strict=True)) for row in values]
+        return Conclusion({LAWS: records}, {LAWS: records}, tuple(notes))
 
-    def _notes(self, rows: Mapping[str, Array], named: list[str]) -> Iterable[str]:
+    def _endings(self, rows: Mapping[str, Array]) -> Iterator[str]:
+        events = {event.name: event.meaning for event in getattr(self.plant, "events", ())}
+        for word in dict.fromkeys(rows["status"].tolist()):
+            if word in events:
+                count = int((rows["status"] == word).sum())
+                yield f"{count} of {len(rows['status'])} runs ended in {word}: {events[word] or word}"
+
+    def _notes(self, rows: Mapping[str, Array], named: list[str]) -> Iterator[str]:
         keys = list(zip(*(rows[name].tolist() for name in named), strict=True))
         for key in dict.fromkeys(keys):
             words = rows["status"][[place for place, other in enumerate(keys) if other == key]]
             bad = [f"{int((words == word).sum())} {word}" for word in dict.fromkeys(words.tolist()) if word != "ok"]
             yield f"{len(words)} samples of {', '.join(map(str, key))}" + (f": {', '.join(bad)}" if bad else ", all ok")
+
+
+def _labels(rows: Mapping[str, Array], varied: list[str]) -> list[str]:
+    values = zip(*(rows[name].tolist() for name in varied), strict=True)
+    return [", ".join(f"{name} = {value:g}" for name, value in zip(varied, row, strict=True)) for row in values]
 
 
 def _taken(table: Mapping[str, Floats], places: Array) -> dict[str, Floats]:

@@ -164,7 +164,7 @@ class Computation:
             evaluation.design_variables,
             self._survey.slices,
             self._survey.baseline,
-            any_baseline=not evaluation.has_poles,
+            any_single=not evaluation.has_poles,
         )
         for rows in self._directory.stream_evaluations():
             tally.add(rows)

@@ -20,6 +20,8 @@ class Event:
     """g(t, x) of t (k,) and x (k, n), (k,); it happens where g becomes negative."""
     terminal: bool = True
     """Whether the run ends there."""
+    meaning: str = ""
+    """What it means, for a sentence in the summary of runs that it ended; empty where the name says it."""
 
 
 @dataclass(frozen=True)

@@ -116,7 +116,8 @@ class Tether(SecondOrder):
     @property
     def events(self) -> tuple[Event, ...]:
         """The meeting of the two satellites."""
-        return (Event("collision", lambda _, x: x[:, 0] - self.shortest),)
+        meaning = f"the tether's length fell to {self.shortest:g}, where the satellites meet and the equations end"
+        return (Event("collision", lambda _, x: x[:, 0] - self.shortest, meaning=meaning),)
 
     @property
     def orbital_period_s(self) -> float:

@@ -75,7 +75,7 @@ class Optima:
         if reference is None:
             return value
         base = self._value(reference, recipe.column)
-        if not base:
+        if not base or (math.isinf(value) and math.isinf(base)):
             return None
         change = value / base - 1.0
         return change if recipe.increase_over else -change
@@ -94,4 +94,4 @@ class Optima:
         for key, value in wanted.items():
             table = table[table[key] == value]
         found = table[column].astype("Float64").dropna()
-        return float(found.iloc[0]) if len(found) and math.isfinite(found.iloc[0]) else None
+        return float(found.iloc[0]) if len(found) and not math.isnan(found.iloc[0]) else None

@@ -25,16 +25,17 @@ def judge(row: PublishedRow, computed: float | None) -> Verdict:
     """Compare a computed number, in the row's unit, with the published one.
 
     A number is reproduced if it differs by no more than the tolerance when it is written with one digit more than the
-    paper prints; a claim if it holds. What the paper leaves undecidable stays so, whatever is computed.
+    paper prints; a claim if it holds, and infinite is more than any bound. What the paper leaves undecidable stays so,
+    whatever is computed.
     """
     number = shown(computed, row.published)
     difference = None if number is None or row.tolerance is None else number - row.published.number
     if row.expected == NOT_DECIDABLE:
         return Verdict(NOT_DECIDABLE, difference)
-    if computed is None or not math.isfinite(computed):
+    if computed is None or math.isnan(computed):
         return Verdict(NOT_REPRODUCED, difference)
-    if difference is not None and row.tolerance is not None:
-        holds = abs(difference) <= row.tolerance
+    if row.tolerance is not None:
+        holds = difference is not None and abs(difference) <= row.tolerance
     else:
         bound = float(row.published.number)
         holds = computed > bound if row.published.relation == ">" else computed < bound

@@ -240,7 +240,9 @@ class _Problem:
         orders = self.law.orders(m, batch)
         kernel = sum_of_exponentials(1.0 - orders.ravel(), float(np.diff(mesh).min()), float(mesh[-1]), self.tolerance)
         weights = kernel.weights.reshape(batch, m, -1)
-        wanted, wanted_rate = (np.array(np.broadcast_to(v, (batch, count, m))) for v in self.law.reference(mesh))
+        wanted, wanted_rate = (
+            np.array(np.broadcast_to(v, (batch, count, m)), order="C") for v in self.law.reference(mesh)
+        )
         begins = np.broadcast_to(self.law.initial_memory(self.start[:, :m] - wanted[:, 0]), (batch, m))
         modes = np.repeat(begins[..., None], len(kernel.rates), axis=2)
         first = self.law.initial_auxiliary(batch)

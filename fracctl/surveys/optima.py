@@ -51,8 +51,8 @@ class Optima:
         design_variables: their columns, in the order of the tables.
         slices: the design variables for each combination of whose values an optimum is selected.
         baseline: values of design variables that the points of kind ``baseline`` have.
-        any_baseline: whether a baseline that is one point only counts even if it is no candidate: free motion that does
-            not stay bounded is what control is compared with.
+        any_single: whether a baseline or a slice that is one point only counts even if it is no candidate: free motion
+            that does not stay bounded is what control is compared with, and a law that fails is one of those compared.
     """
 
     def __init__(
@@ -61,9 +61,9 @@ class Optima:
         design_variables: Sequence[str],
         slices: Sequence[str] = (),
         baseline: Mapping[str, float] | None = None,
-        any_baseline: bool = False,
+        any_single: bool = False,
     ) -> None:
-        self._any_baseline = any_baseline
+        self._any_single = any_single
         self._objectives = objectives
         self._design_variables = tuple(design_variables)
         self._slices = tuple(slices)
@@ -105,13 +105,17 @@ class Optima:
             matching = np.logical_and.reduce([rows[column] == value for column, value in self._baseline.items()])
             self._offer(rows, allowed & matching, (objective, name, "baseline", ()))
             here = present & matching & (rows["status"] != "failed")
-            if self._any_baseline and np.count_nonzero(here) == 1 and not np.any(allowed & here):
+            if self._any_single and np.count_nonzero(here) == 1 and not np.any(allowed & here):
                 self._offer(rows, here, (objective, name, "baseline", ()))
         if self._slices:
             table = np.stack([rows[column] for column in self._slices], axis=-1)
-            for values in np.unique(table[allowed], axis=0):
-                inside = allowed & (table == values).all(axis=1)
-                self._offer(rows, inside, (objective, name, "slice", tuple(values.tolist())))
+            for values in np.unique(table[present], axis=0):
+                inside = (table == values).all(axis=1)
+                here = present & inside & (rows["status"] != "failed")
+                alone = self._any_single and np.count_nonzero(here) == 1
+                self._offer(
+                    rows, here if alone else allowed & inside, (objective, name, "slice", tuple(values.tolist()))
+                )
 
     def _offer(self, rows: Rows, allowed: Booleans, place: _Place) -> None:
         (where,) = np.nonzero(allowed)
