@@ -41,7 +41,7 @@ class ClosedLoop:
 
     Raises:
         ArgumentError: the shapes of the law's gains do not fit the plant.
-        UnsupportedError: the law takes linear plants only, and this one is not.
+        UnsupportedError: the law's gains follow from the matrices of a linear plant, and this one has none.
     """
 
     plant: LinearPlant | StatePlant
@@ -76,18 +76,38 @@ class ClosedLoop:
         return law.delayed_terms(self.plant.n_states, self.plant.n_controls) if isinstance(law, DelayedLaw) else ()
 
     @cached_property
+    def law_terms(self) -> LinearLawTerms:
+        """The law as data; free motion has one term that is zero.
+
+        Raises:
+            UnsupportedError: it is no linear law, or its gains follow from a linear plant and this one is not.
+        """
+        plant, law = self.plant, self.controller
+        m = plant.n_controls
+        if law is None:
+            return LinearLawTerms((FractionalTerm(np.zeros((m, m)), np.zeros(m)),))
+        if isinstance(law, DelayedLaw | MemoryLaw):
+            found = Need.DELAYS if isinstance(law, DelayedLaw) else Need.NONLINEAR_LAW
+            raise UnsupportedError(f"a linear law is asked for, but this loop has {found}")
+        if not isinstance(law, ModelBasedLaw):
+            return law.linear_terms(m)
+        if not isinstance(plant, LinearPlant):
+            name = f"{type(law).__name__} takes its gains from a linear plant, but {type(plant).__name__} is not"
+            raise UnsupportedError(f"{name}; take PD with the gains of its linearisation")
+        return law.for_plant(plant).linear_terms(m)
+
+    @cached_property
     def system(self) -> LinearFractionalSystem:
         """The loop as a linear fractional system.
 
         Raises:
             UnsupportedError: it is not one.
         """
-        plant, given = self.plant, self.controller
-        if not isinstance(plant, LinearPlant) or isinstance(given, DelayedLaw | MemoryLaw):
+        plant = self.plant
+        if not isinstance(plant, LinearPlant) or isinstance(self.controller, DelayedLaw | MemoryLaw):
             found = " and ".join(sorted(self.needs))
             raise UnsupportedError(f"a linear fractional loop is asked for, but this one has {found}")
-        m = plant.n_controls
-        law = _terms(plant, given)
+        m, law = plant.n_controls, self.law_terms
         q = law.n_auxiliary
         identity = FractionalTerm(np.eye(m + q), np.array([2.0] * m + [1.0] * q))
         free = [
@@ -96,37 +116,27 @@ class ClosedLoop:
         ]
         feedback = [FractionalTerm(_pad(-term.matrix, 0, q, 0), term.orders) for term in law.control]
         memory = [FractionalTerm(_pad(-term.matrix, m, 0, 0), term.orders) for term in law.auxiliary]
-        terms = law.control + law.auxiliary
-        sizes = {f"matrix_{i}": (term.matrix, 2) for i, term in enumerate(terms)}
-        sizes |= {f"orders_{i}": (term.orders, 1) for i, term in enumerate(terms)}
-        initial = np.zeros(0) if law.auxiliary_initial is None else law.auxiliary_initial
         return LinearFractionalSystem(
-            m, q, (identity, *free, *feedback, *memory), law.control, initial, batch_size(**sizes)
+            m, q, (identity, *free, *feedback, *memory), law.control, self._auxiliary_initial, _law_batch(law)
         )
 
     @property
     def batch(self) -> int | None:
         """Batch size b, None for a single loop."""
         limited = None if self.saturation is None else self.saturation.batch
-        if isinstance(self.controller, MemoryLaw):
-            sizes = {limited, self.controller.batch} - {None}
-            if len(sizes - {1}) > 1:
-                raise ArgumentError("controller", f"a batch of {self.controller.batch}", f"must be one of {limited}")
-            return max((size for size in sizes if size is not None), default=None)
-        if self.delayed_terms:
-            sizes = {limited, *(term.batch for term in self.delayed_terms)} - {None}
-            if len(sizes - {1}) > 1:
-                raise ArgumentError(
-                    "controller", f"a sum of batches of {sorted(map(str, sizes))}", "must have one size"
-                )
-            return max((size for size in sizes if size is not None), default=None)
-        if self.controller is None:
-            return None
-        return self.system.batch
+        law = self.controller
+        if isinstance(law, DelayedLaw):
+            own = {term.batch for term in self.delayed_terms}
+        else:
+            own = {law.batch if isinstance(law, MemoryLaw) else _law_batch(self.law_terms)}
+        sizes = {limited, *own} - {None}
+        if len(sizes - {1}) > 1:
+            raise ArgumentError("controller", f"a sum of batches of {sorted(map(str, sizes))}", "must have one size")
+        return max((size for size in sizes if size is not None), default=None)
 
     def initial_values(self, initial_state: Floats) -> tuple[Floats, Floats]:
         """Split states (…, 2m) or (…, 2m+q) into y(0) and y'(0), (…, m+q); y' of auxiliary states is not needed."""
-        m, q = self.system.n_positions, self.system.n_auxiliary
+        m, q = self.plant.n_controls, self.law_terms.n_auxiliary
         if initial_state.ndim not in (1, 2) or initial_state.shape[-1] not in (2 * m, 2 * m + q):
             allowed = f"must have shape ({2 * m},) or (b, {2 * m})"
             raise ArgumentError("initial_state", f"of shape {initial_state.shape}", allowed)
@@ -134,18 +144,21 @@ class ClosedLoop:
         if initial_state.shape[-1] == 2 * m + q:
             z0 = initial_state[..., 2 * m :]
         else:
-            z0 = np.broadcast_to(self.system.auxiliary_initial, (*lead, q))
+            z0 = np.broadcast_to(self._auxiliary_initial, (*lead, q))
         value = np.concatenate([initial_state[..., :m], z0], axis=-1)
         rate = np.concatenate([initial_state[..., m : 2 * m], np.zeros((*lead, q))], axis=-1)
         return value, rate
 
+    @property
+    def _auxiliary_initial(self) -> Floats:
+        initial = self.law_terms.auxiliary_initial
+        return np.zeros(0) if initial is None else initial
 
-def _terms(plant: LinearPlant, law: LinearLaw | ModelBasedLaw | None) -> LinearLawTerms:
-    """Return a linear law as data; free motion has one term that is zero."""
-    m = plant.n_controls
-    if law is None:
-        return LinearLawTerms((FractionalTerm(np.zeros((m, m)), np.zeros(m)),))
-    return (law.for_plant(plant) if isinstance(law, ModelBasedLaw) else law).linear_terms(m)
+
+def _law_batch(law: LinearLawTerms) -> int | None:
+    terms = law.control + law.auxiliary
+    sizes = {f"matrix_{i}": (term.matrix, 2) for i, term in enumerate(terms)}
+    return batch_size(**sizes, **{f"orders_{i}": (term.orders, 1) for i, term in enumerate(terms)})
 
 
 def _pad(matrix: Floats, rows_before: int, rows_after: int, columns_after: int) -> Floats:

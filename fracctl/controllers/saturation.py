@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fracctl.arrays import Floats, finite
+from fracctl.arrays import Array, Floats, finite
 from fracctl.errors import ArgumentError
 
 
@@ -57,6 +57,10 @@ class Saturation:
             return np.concatenate([demand - limit, demand + limit], axis=-1)
         beyond: Floats = np.linalg.norm(demand, axis=-1, keepdims=True) - limit
         return beyond
+
+    def take(self, rows: Array) -> Saturation:
+        """Return the limits of some members."""
+        return self if self.batch in (None, 1) else Saturation(self.limit[rows], self.by)
 
     def check(self, n_controls: int) -> None:
         """Raise ArgumentError unless the limit fits a plant with m controls."""

@@ -44,7 +44,9 @@ class BatchSolver(ABC):
         if not beyond:
             return self._refusal(loop.system)
         found = " and ".join(beyond)
-        return f"the {self.name} solver takes linear fractional loops, but this one has {found}; use 'method_of_steps'"
+        use = "explicit_memory" if Need.FRACTIONAL_TERMS in loop.needs else "method_of_steps"
+        use = "implicit_memory" if Need.NONLINEAR_LAW in loop.needs else use
+        return f"the {self.name} solver takes linear fractional loops, but this one has {found}; use '{use}'"
 
     def solve(self, loop: ClosedLoop, initial_state: ArrayLike, horizon: float) -> Trajectory:
         """Return the trajectories of all members on one grid.

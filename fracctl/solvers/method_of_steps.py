@@ -79,9 +79,13 @@ class MethodOfSteps:
         """Return None for delayed feedback and free motion, otherwise why it is refused and what to use instead."""
         if len(loop.delayed_terms) > 1 and any(term.on_segment is not None for term in loop.delayed_terms):
             return f"the {self.name} solver renews gains with one delay only; use one law"
-        if Need.FRACTIONAL_TERMS not in loop.needs:
+        if Need.NONLINEAR_LAW in loop.needs:
+            use = "implicit_memory"
+        elif Need.FRACTIONAL_TERMS in loop.needs:
+            use = "contour" if loop.needs == {Need.FRACTIONAL_TERMS} else "explicit_memory"
+        else:
             return None
-        return f"the {self.name} solver does not take {type(loop.controller).__name__}; use 'contour'"
+        return f"the {self.name} solver does not take {type(loop.controller).__name__}; use '{use}'"
 
     def solve(self, loop: ClosedLoop, initial_state: ArrayLike, horizon: float) -> StepwiseTrajectory:
         """Return the trajectories of all members.
