@@ -51,6 +51,7 @@ BUILT_IN: Mapping[str, Mapping[str, str]] = {
         "contour": "fracctl.solvers:Contour",
         "volterra": "fracctl.solvers:Volterra",
         "collocation": "fracctl.solvers:Collocation",
+        "explicit_memory": "fracctl.solvers:ExplicitMemory",
         "method_of_steps": "fracctl.solvers:MethodOfSteps",
         "implicit_memory": "fracctl.solvers:ImplicitMemory",
     },

@@ -14,11 +14,22 @@ from fracctl.solvers.solve import solve
 if TYPE_CHECKING:
     from fracctl.solvers.collocation import Collocation
     from fracctl.solvers.contour import Contour
+    from fracctl.solvers.explicit_memory import ExplicitMemory
     from fracctl.solvers.implicit_memory import ImplicitMemory
     from fracctl.solvers.method_of_steps import MethodOfSteps
     from fracctl.solvers.volterra import Volterra
 
-__all__ = ["Collocation", "Contour", "ImplicitMemory", "MethodOfSteps", "Solver", "Survey", "Volterra", "solve"]
+__all__ = [
+    "Collocation",
+    "Contour",
+    "ExplicitMemory",
+    "ImplicitMemory",
+    "MethodOfSteps",
+    "Solver",
+    "Survey",
+    "Volterra",
+    "solve",
+]
 
 
 def __getattr__(name: str) -> Any:

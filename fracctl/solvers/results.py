@@ -65,12 +65,15 @@ def without_trajectory(members: Members, status: str) -> Survey:
     return Survey(members.rows, trajectory)
 
 
-def merged(parts: list[Survey], batch: int) -> Trajectory:
-    """Bring all members to the grid with most nodes."""
+def merged(parts: list[Survey], batch: int, common: PanelGrid | None = None) -> Trajectory:
+    """Bring all members to one grid, by default that with most nodes."""
     first = parts[0].trajectory
     if len(parts) == 1 and np.array_equal(parts[0].rows, np.arange(batch)):
         return first
-    grid = max((part.trajectory.grid for part in parts), key=lambda g: len(g.times))
+    grid = common or max((part.trajectory.grid for part in parts), key=lambda g: len(g.times))
+    times = grid.times.copy()
+    last = grid.offsets[1:] - 1
+    times[last] = np.nextafter(times[last], 0.0)
     order = np.concatenate([part.rows for part in parts])
     place = np.argsort(order, kind="stable")
 
@@ -79,7 +82,7 @@ def merged(parts: list[Survey], batch: int) -> Trajectory:
 
     def regridded(name: str) -> Floats:
         values = [
-            getattr(t, name) if t.grid is grid else t.grid.evaluate(getattr(t, name), grid.times)
+            getattr(t, name) if t.grid is grid else t.grid.evaluate(getattr(t, name), times)
             for t in (part.trajectory for part in parts)
         ]
         out: Floats = np.concatenate(values)[place]

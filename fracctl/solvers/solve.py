@@ -14,13 +14,19 @@ from fracctl.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from fracctl.meshwise import MeshTrajectory
+    from fracctl.solvers.explicit_memory import ExplicitMemory
     from fracctl.stepwise import StepwiseTrajectory
 
-_SOLVERS = {"contour": "Contour", "volterra": "Volterra", "collocation": "Collocation"}
+_SOLVERS = {
+    "contour": "Contour",
+    "volterra": "Volterra",
+    "collocation": "Collocation",
+    "explicit_memory": "ExplicitMemory",
+}
 """Class in the module of the name, which is loaded at first use."""
 
 
-def make_solver(name: str, tolerance: float | None = None) -> BatchSolver:
+def make_solver(name: str, tolerance: float | None = None) -> BatchSolver | ExplicitMemory:
     """Return a solver with its default options, or with a tolerance.
 
     Raises:
@@ -28,7 +34,7 @@ def make_solver(name: str, tolerance: float | None = None) -> BatchSolver:
     """
     if name not in _SOLVERS:
         raise ArgumentError("solver", repr(name), f"must be one of {sorted(_SOLVERS)}{suggestion(name, _SOLVERS)}")
-    kind: type[BatchSolver] = getattr(import_module(f"fracctl.solvers.{name}"), _SOLVERS[name])
+    kind: type[BatchSolver | ExplicitMemory] = getattr(import_module(f"fracctl.solvers.{name}"), _SOLVERS[name])
     return kind() if tolerance is None else kind(tolerance=tolerance)  # type: ignore[call-arg]
 
 
@@ -37,7 +43,7 @@ def solve(
     loop: ClosedLoop,
     initial_state: ArrayLike,
     horizon: float,
-    solver: Literal["contour", "volterra", "collocation"] = ...,
+    solver: Literal["contour", "volterra", "collocation", "explicit_memory"] = ...,
     tolerance: float | None = ...,
 ) -> Trajectory: ...
 
@@ -81,9 +87,10 @@ def solve(
         loop: plant and law, of b members or a single one.
         initial_state: [ξ(0), ξ'(0)], or x(0) of a plant in state form, (n,) or (b, n), dimensionless.
         horizon: last time, dimensionless.
-        solver: ``contour``, ``volterra`` or ``collocation`` for linear fractional loops, ``method_of_steps`` for
-            delayed feedback and free motion, nonlinear plants included; ``implicit_memory`` for laws with a memory in
-            the loop on stiff plants, as of a tether.
+        solver: ``contour``, ``volterra`` or ``collocation`` for linear fractional loops, ``explicit_memory`` for the
+            same laws on nonlinear plants and with saturation, ``method_of_steps`` for delayed feedback and free
+            motion, nonlinear plants included; ``implicit_memory`` for nonlinear laws with a memory in the loop on
+            stiff plants, as of a tether.
         tolerance: error relative to the peaks of positions and controls above which a trajectory is ``failed``; None
             for the solver's own, 1e-8 (1e-2 for ``collocation``, which is not made for more; any for
             ``method_of_steps`` and ``implicit_memory``, which tell their errors in `error_estimate`).
