@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from fracctl.arrays import Array, Floats, joined
-from fracctl.controllers import Saturation
 from fracctl.design.delays import first_return, natural_period
 from fracctl.errors import ArgumentError
 from fracctl.evaluation import COUNTERS, Conclusion, Evaluation, geometric_mean
@@ -47,10 +46,11 @@ class DelayedEvaluation(Evaluation):
     delay_from: Literal["given", "period", "first_return"] = "given"
     """Where τ comes from: the law's parameter; the plant's own period; the first return of the free motion from each
     initial condition to the plant's section."""
-    saturation: Saturation | None = None
-    """What the thrusters can give; None for any."""
 
-    has_poles = False
+    @property
+    def has_poles(self) -> bool:
+        """Never: delays have an equation of their own, with infinitely many."""
+        return False
 
     def __post_init__(self) -> None:
         super().__post_init__()

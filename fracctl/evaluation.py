@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, ClassVar, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
 from fracctl.arrays import Array, Floats
 from fracctl.controllers.linear import LinearLaw, ModelBasedLaw
 from fracctl.controllers.parameters import Parameter
+from fracctl.controllers.saturation import Saturation
 from fracctl.errors import ArgumentError, UnsupportedError
 from fracctl.loop import ClosedLoop
 from fracctl.measures.base import Measure
@@ -73,9 +74,8 @@ class Evaluation:
     objective: str
     """Name of the primary objective."""
     horizon: float
-
-    has_poles: ClassVar[bool] = True
-    """Whether a characteristic equation decides on stability."""
+    saturation: Saturation | None = None
+    """What the thrusters can give; None for any."""
 
     def __post_init__(self) -> None:
         known = [column for measure in self.measures for column in measure.columns]
@@ -85,6 +85,12 @@ class Evaluation:
                     raise ArgumentError(f"objectives.{name}", repr(column), f"must name measured columns {known}")
         if self.objective not in self.objectives:
             raise ArgumentError("objective", repr(self.objective), f"must be one of {sorted(self.objectives)}")
+
+    @property
+    def has_poles(self) -> bool:
+        """Whether a characteristic equation decides on stability."""
+        plant: object = self.plant
+        return isinstance(plant, LinearPlant) and self.saturation is None
 
     @cached_property
     def design_variables(self) -> tuple[str, ...]:
@@ -114,13 +120,15 @@ class Evaluation:
 
     def loop(self, design: Mapping[str, Floats | float]) -> ClosedLoop:
         """Return the closed loop, of a batch where `design` holds arrays."""
-        return ClosedLoop(self.plant, self.law.from_parameters(self.plant.components, {**self.parameters, **design}))
+        law = self.law.from_parameters(self.plant.components, {**self.parameters, **design})
+        return ClosedLoop(self.plant, law, self.saturation)
 
     def __call__(self, design: Mapping[str, Floats]) -> dict[str, Array]:
         """Return the rows of b design points: all points of the first initial condition, then of the next.
 
         `status` is ``ok``, ``unsettled`` (no settling within the horizon, or a marginal loop), ``unstable``,
-        ``diverged`` or ``failed`` (certificate not met). Measures of trajectories that do not exist are +inf.
+        ``diverged``, ``failed`` (certificate not met) or the name of the plant's event that ended it. Measures of
+        trajectories that do not exist are +inf.
         """
         full = self._full_design(design)
         b, k = len(next(iter(full.values()))), len(self.initial_conditions)
@@ -193,7 +201,7 @@ class Evaluation:
         rows |= {f"objective_{name}": mean for name, mean in means.items()}
         status = trajectory.status.copy()
         unsettled = np.logical_or.reduce([~np.isfinite(column) for column in values.values()])
-        marginal = np.array([verdict is None for verdict in trajectory.stable], dtype=bool)
+        marginal = np.array([self.has_poles and verdict is None for verdict in trajectory.stable], dtype=bool)
         status[(status == "ok") & (unsettled | marginal)] = "unsettled"
         rows |= {"status": status, "stable": trajectory.stable, "error_estimate": trajectory.error_estimate}
         return rows | {name: trajectory.counters[name] for name in COUNTERS}

@@ -64,7 +64,10 @@ class MemoryEvaluation(Evaluation):
     """Number of the first; any sample can be drawn again by its number."""
     seed: int = 0
 
-    has_poles = False
+    @property
+    def has_poles(self) -> bool:
+        """Never: the law is not linear."""
+        return False
 
     def __post_init__(self) -> None:
         if not self.dispersed:

@@ -17,6 +17,7 @@ from fracctl.config.options import construct
 from fracctl.config.schemas import AccuracyEvaluation, ComparisonEvaluation, GridSurvey, RunConfig, SingleSurvey
 from fracctl.config.schemas import DelayedEvaluation as DelayedOptions
 from fracctl.config.schemas import MemoryEvaluation as MemoryOptions
+from fracctl.config.schemas import PerformanceEvaluation as PerformanceOptions
 from fracctl.controllers import Saturation
 from fracctl.dispersions import Distribution
 from fracctl.errors import ArgumentError, ConfigurationError
@@ -55,19 +56,19 @@ def build_evaluation(config: RunConfig) -> Evaluation:
         "objectives": {name: tuple(columns) for name, columns in config.objectives.items()},
         "objective": config.objective,
     }
-    if isinstance(config.evaluation, DelayedOptions):
-        return _delayed(config.evaluation, common)
-    if isinstance(config.evaluation, MemoryOptions):
-        return _memory(config.evaluation, config.seed, common)
-    return Evaluation(**common)
+    given = config.evaluation
+    if isinstance(given, MemoryOptions):
+        return _memory(given, config.seed, common)
+    if isinstance(given, DelayedOptions | PerformanceOptions) and given.largest_control is not None:
+        common["saturation"] = Saturation(given.largest_control, given.largest_by)
+    return _delayed(given, common) if isinstance(given, DelayedOptions) else Evaluation(**common)
 
 
 def _delayed(given: DelayedOptions, common: Mapping[str, Any]) -> Evaluation:
     from fracctl.delayed_evaluation import DelayedEvaluation  # loads the solver
 
-    saturation = None if given.largest_control is None else Saturation(given.largest_control, given.largest_by)
     try:
-        return DelayedEvaluation(**common, delay_from=given.delay_from, saturation=saturation)
+        return DelayedEvaluation(**common, delay_from=given.delay_from)
     except ArgumentError as error:
         cure = f"; {error.instead}" if error.instead else ""
         raise ConfigurationError(f"{error.name} = {error.value}: {error.allowed}{cure}") from error

@@ -36,10 +36,17 @@ class GridSurvey(Typed):
     """Values that the point has with which the optimum is compared."""
 
 
+LargestControl = Annotated[Number, Field(gt=0.0)] | None
+
+
 class PerformanceEvaluation(Typed):
     """Measures of trajectories, and objectives."""
 
     type: Literal["performance"] = "performance"
+    largest_control: LargestControl = None
+    """What the thrusters can give, dimensionless; None for any."""
+    largest_by: Literal["norm", "axis"] = "norm"
+    """Whether that limits the magnitude or each component."""
 
 
 class AccuracyEvaluation(Typed):
@@ -64,7 +71,7 @@ class DelayedEvaluation(Typed):
     type: Literal["delayed"]
     delay_from: Literal["given", "period", "first_return"] = "given"
     """Where τ comes from: `controller.delay`, the plant's own period, or the first return of the free motion."""
-    largest_control: Annotated[Number, Field(gt=0.0)] | None = None
+    largest_control: LargestControl = None
     """What the thrusters can give, dimensionless; None for any."""
     largest_by: Literal["norm", "axis"] = "norm"
     """Whether that limits the magnitude or each component."""
