@@ -34,7 +34,8 @@ def grunwald_letnikov(values: ArrayLike, step: float, order: float) -> Floats:
     y = _samples(values, step, order, -1.0)
     k = np.arange(1, y.shape[-1])
     weights = np.concatenate([[1.0], np.cumprod(1.0 - (order + 1.0) / k)])
-    return _convolved(y, weights) * step**-order
+    derivative: Floats = _convolved(y, weights) * step**-order
+    return derivative
 
 
 def l1(values: ArrayLike, step: float, order: float) -> Floats:

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fracctl.arrays import Array, Booleans, Floats, finite
+from fracctl.arrays import Array, Booleans, Floats, finite, share
 from fracctl.characteristic.bounds import pole_radius
 from fracctl.characteristic.matrix import CharacteristicMatrix
 from fracctl.characteristic.winding import unstable_zeros
@@ -34,13 +34,15 @@ from fracctl.trajectory import Trajectory
 NODES = 14
 """Nodes on a step."""
 _COARSE_NODES = 10
-_FIRST_STEP = 0.1
-"""Over the tolerance and an even step."""
+_FIRST_STEP = 1e-9
+"""Over an even step, or a tenth of the tolerance; between its nodes controls are powers of time, no polynomials."""
 _COARSER = 8.0
 """First step and kernel error of the coarse solution over those of the fine one."""
 _OF_THE_KERNEL = 1e-2
 """Its share of the tolerance."""
 _MOST_DOUBLINGS = 6
+_DIVERGED = 1e3
+"""Growth of the states beyond which a motion that could not be followed is called diverged, not failed."""
 _TOGETHER = 256
 """Members that are solved together; saturated ones share the breaks of all."""
 _TOGETHER_SATURATED = 32
@@ -57,20 +59,20 @@ class ExplicitMemory:
     Args:
         steps: even steps in 2π of time to begin with, from 1 to 1000.
         tolerance: largest error relative to the peaks of positions and controls, in [1e-11, 1e-3].
+        cross_check: share of a survey's rows that the contour solver computes too, in [0, 1]; linear loops only.
 
     Raises:
         ArgumentError: an argument lies outside its range.
     """
 
     name = "explicit_memory"
-    cross_check = 0.0
     checked_by = "contour"
 
-    def __init__(self, steps: int = 8, tolerance: float = 1e-8) -> None:
+    def __init__(self, steps: int = 8, tolerance: float = 1e-8, cross_check: float = 0.0) -> None:
         self.steps = whole("steps", steps, 1, 1000)
         if not 1e-11 <= tolerance <= 1e-3:
             raise ArgumentError("tolerance", tolerance, "must lie in [1e-11, 1e-3]")
-        self.tolerance = float(tolerance)
+        self.tolerance, self.cross_check = float(tolerance), share("cross_check", cross_check)
 
     def supports(self, loop: ClosedLoop) -> str | None:
         """Return None for second-order plants under linear laws, otherwise why a loop is refused and the cure."""
@@ -81,6 +83,10 @@ class ExplicitMemory:
                 f"the {self.name} solver takes plants whose states are m positions and then their rates, one control"
                 f" each, but {type(loop.plant).__name__} has others; choose such states"
             )
+        beyond = loop.needs - {Need.FRACTIONAL_TERMS}
+        if self.cross_check and beyond:
+            found = " and ".join(sorted(beyond))
+            return f"no second solver takes a loop with {found}; set cross_check to 0"
         positions, others = highest_used(loop.law_terms, loop.plant.n_controls)
         if positions >= 2.0 or others >= 1.0:
             return (
@@ -143,7 +149,7 @@ class ExplicitMemory:
         """Refine until the difference of two solutions is small; yield members that are done from all k states."""
         turns, kernel = problem.horizon / (2.0 * np.pi), _OF_THE_KERNEL * self.tolerance
         count = max(int(np.ceil(self.steps * turns)), 1)
-        first = _FIRST_STEP * self.tolerance * problem.horizon / count
+        first = min(_FIRST_STEP, 0.1 * self.tolerance) * problem.horizon / count
 
         def on(steps: int, breaks: Floats) -> Floats:
             return step_edges(problem.horizon, steps, first, breaks, problem.has_powers)
@@ -187,8 +193,8 @@ def _packed(part: _Part, rows: Array, stable: Array, k: int, tolerance: float) -
     status[(status == "ok") & np.equal(verdict, False)] = "unstable"
     ended = solved.ended[1] != None  # noqa: E711 - an array of words
     status[ended & (status != "failed")] = solved.ended[1][ended & (status != "failed")]
-    status[~solved.complete] = "diverged"
-    shown = solved.alive & (status != "diverged")[:, None]
+    status[~solved.complete] = np.where(_has_grown(solved), "diverged", "failed")[~solved.complete]
+    shown = solved.alive & solved.complete[:, None]
 
     def at_nodes(values: Floats) -> Floats:
         return np.where(shown[:, None, :, None], values, np.nan).reshape(b, values.shape[1], len(solved.grid.times))
@@ -209,6 +215,14 @@ def _packed(part: _Part, rows: Array, stable: Array, k: int, tolerance: float) -
             counters={"nodes": part.nodes},
         ),
     )
+
+
+def _has_grown(solved: Run) -> Booleans:
+    """Return whether members have left the neighbourhood of where they began by orders of magnitude, (b,)."""
+    n = 2 * solved.problem.signals.n_positions
+    reached = np.nanmax(np.abs(solved.values[:, :n]), axis=(1, 2, 3), initial=0.0)
+    grown: Booleans = reached > _DIVERGED * np.abs(solved.problem.start[:, :n]).max(axis=1)
+    return grown
 
 
 def _states(loop: ClosedLoop, states: Floats) -> tuple[Floats, Floats, Floats]:

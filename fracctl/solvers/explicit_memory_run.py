@@ -105,6 +105,8 @@ class Run:
         for event in self.problem.plant.events:
             if not event.terminal:
                 continue
+            at_once = event.function(np.zeros(b), self.problem.start[:, : 2 * m]) < 0.0
+            end[at_once], names[at_once] = 0.0, event.name
             flat = np.moveaxis(self.values[:, : 2 * m], 1, -1).reshape(-1, 2 * m)
             signs = event.function(np.tile(times, b), flat).reshape(b, 1, *self.values.shape[2:])
             members, found = crossings(self.values, self.edges, partial(_of_states, event, 2 * m), signs)
@@ -182,8 +184,8 @@ def run(problem: Problem, edges: Floats, nodes: int, tolerance: float) -> Run:
         return np.moveaxis(signals.gains @ integrals.transpose(1, 0, 2), 0, 1)
 
     first = start.copy()
-    at_rest = np.concatenate([first[: 2 * m], np.zeros((m, b)), first[2 * m :], np.zeros((q, b))])[..., None]
-    demand = law(np.repeat(at_rest, nodes, axis=2), np.zeros((len(history.deep), b, nodes)))[..., :1]
+    values = motion(np.zeros((m + q, b, nodes)), 0.0, first)
+    demand = law(values, history.on_step(0.0, values))[..., :1]
     pull, control = problem.accelerations(edges[:1], first[: 2 * m, :, None], demand[:m])
     begin = np.concatenate([pull, demand[m:]]), demand[:m], control
     kept = np.full((2 * m + q, b, count, nodes), np.nan)

@@ -171,7 +171,7 @@ def test_shapes_horizons_and_loops_that_are_refused(solver: BatchSolver) -> None
     assert solver.supports(loop) is None
 
 
-@pytest.mark.parametrize("name", ["contour", "volterra", "collocation"])
+@pytest.mark.parametrize("name", ["contour", "volterra", "collocation", "explicit_memory"])
 def test_solvers_by_name(name: str) -> None:
     loop = ClosedLoop(HCWOutOfPlane(), PDAlpha(0.85, 2.0, 0.91))
     trajectory = solve(loop, [0.0, 0.002], 12.0 * np.pi, solver=name)
@@ -189,7 +189,13 @@ def test_an_unknown_solver_is_refused() -> None:
 
 
 @pytest.mark.parametrize(
-    "words", [["solver=volterra"], ["solver=collocation"], ["solver=collocation", "solver.form=first_order"]]
+    "words",
+    [
+        ["solver=volterra"],
+        ["solver=explicit_memory"],
+        ["solver=collocation"],
+        ["solver=collocation", "solver.form=first_order"],
+    ],
 )
 def test_a_survey_by_configuration(words: list[str], tmp_path: Path) -> None:
     tiny = ["survey.axes.alpha_w=[0.91,1.0]", "survey.axes.k_p_w=[0.55,0.85]", "survey.axes.k_d_w=[0,2]"]

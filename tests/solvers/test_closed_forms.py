@@ -13,8 +13,7 @@ from fracctl.controllers import LinearLaw, LinearLawTerms, PDAlpha, PDLag, PILam
 from fracctl.fractional.terms import FractionalTerm
 from fracctl.loop import ClosedLoop
 from fracctl.plants import HCWInPlane, HCWOutOfPlane, LinearPlant
-from fracctl.solvers import Collocation, Contour, Volterra
-from fracctl.solvers.batched import BatchSolver
+from fracctl.solvers import Collocation, Contour, ExplicitMemory, Solver, Volterra
 from tests.references import loops, series
 from tests.references.laplace import Reference
 from tests.references.loops import Loop
@@ -137,10 +136,11 @@ CASES = [
     companion_case("lag", PDLag(0.5, 2.0, 0.3), filtered_pid(*OUT_OF_PLANE, 0.5, 0.0, 2.0, 0.3)),
     companion_case("PID", PILambdaDMu(1.0, 0.7, 2.0), pid(*OUT_OF_PLANE, 1.0, 0.7, 2.0)),
 ]
-SOLVERS: list[tuple[BatchSolver, float, float]] = [
+SOLVERS: list[tuple[Solver, float, float]] = [
     (Contour(), 1e-8, 1e-8),
     (Volterra(), 1e-9, 1e-9),
     (Volterra(nodes=16), 1e-8, 1e-8),
+    (ExplicitMemory(), 1e-9, 1e-9),
     (Collocation(96), 1e-9, 2e-3),
     (Collocation(96, form="first_order"), 1e-9, 2e-3),
 ]
@@ -149,7 +149,7 @@ SOLVERS: list[tuple[BatchSolver, float, float]] = [
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 @pytest.mark.parametrize(("solver", "smooth", "other"), SOLVERS)
-def test_closed_forms(case: Case, solver: BatchSolver, smooth: float, other: float) -> None:
+def test_closed_forms(case: Case, solver: Solver, smooth: float, other: float) -> None:
     trajectory = solver.solve(case.loop, case.start, HORIZON)
     positions, controls = case.values
     m = positions.shape[1]

@@ -10,8 +10,7 @@ import pytest
 from fracctl.controllers import LinearLaw, PDDAlpha, PILambdaDMu
 from fracctl.loop import ClosedLoop
 from fracctl.plants import HCWInPlane, HCWOutOfPlane
-from fracctl.solvers import Collocation, Contour, Volterra
-from fracctl.solvers.batched import BatchSolver
+from fracctl.solvers import Collocation, Contour, ExplicitMemory, Solver, Volterra
 from tests.references.laws import ActedLoop, Action
 from tests.systems.laws import IN_PLANE, OUT_OF_PLANE
 
@@ -62,7 +61,7 @@ CASES = [
     pi_lambda_d_mu("PI^0.3D", 0.8, 0.3, 1.0, (0.3,), (1.0,), (0.0, 2e-3)),
     pi_lambda_d_mu("PI^λD^μ in plane", K_P, K_I, K_D, (0.7, 0.4), (0.95, 0.9), (1e-3, -2e-3, 5e-4, 2e-3)),
 ]
-SOLVERS: list[BatchSolver] = [Contour(), Volterra(), Collocation(128)]
+SOLVERS: list[Solver] = [Contour(), Volterra(), ExplicitMemory(), Collocation(128)]
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
@@ -86,7 +85,7 @@ def test_members_of_a_batch_have_their_own_orders() -> None:
     names = ("k_p", "k_i", "k_d", "integral_order", "derivative_order")
     law = PILambdaDMu(*(np.ravel([getattr(one, name) for one in laws]) for name in names))
     starts = np.array([case.start for case in cases])
-    for solver in (Contour(), Volterra()):
+    for solver in (Contour(), Volterra(), ExplicitMemory()):
         trajectory = solver.solve(ClosedLoop(HCWOutOfPlane(), law), starts, HORIZON)
         for i, case in enumerate(cases):
             exact = case.exact()[:, 0]
