@@ -59,6 +59,8 @@ COMPANIONS = {
     "controller=pd_alpha_in_plane": ["plant=hcw_in_plane"],
     "plant=tether": ["experiment=libration", "initial_condition=own", "initial_condition.own.length=1"],
     "controller=pd_alpha_full": ["plant=hcw"],
+    "controller=pd_alpha_relative": ["experiment=nonlinear_ic1"],
+    "initial_condition=ic1_relative": ["experiment=nonlinear_ic1"],
     "controller=pd_lag_in_plane": ["plant=hcw_in_plane"],
     "controller=pid_in_plane": ["plant=hcw_in_plane"],
     "controller=pdd_alpha_in_plane": ["plant=hcw_in_plane"],
@@ -129,7 +131,7 @@ TINY_DELAYED = {
     "libration_window": ["survey.axes.gain_1_2=[0.2,0.3]", "survey.axes.recall=[0.0,0.3]"],
     "formation_weights": ["survey.axes.beta=[100.0,1000.0]"],
 }
-FIXED = {"inplane_decoupled": 1, "inplane_lqr": 1, "inplane_published": 2}
+FIXED = {"inplane_decoupled": 1, "inplane_lqr": 1, "inplane_published": 2, "nonlinear_ic1": 1}
 """Experiments of so few design points that they need no budget, with their number."""
 
 

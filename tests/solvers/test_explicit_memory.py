@@ -148,6 +148,14 @@ def test_orders_of_convergence_without_memory(nodes: int, order: float) -> None:
     assert -np.polyfit(np.log(counts), np.log(found), 1)[0] == pytest.approx(order, abs=0.3)
 
 
+@pytest.mark.parametrize("alpha", [0.1, 0.2, 0.35, 0.5, 0.65])
+def test_orders_of_convergence_with_memory(alpha: float) -> None:
+    """The polynomial of ξ' is off by O(h^K), and what I^(1-α) on the step makes of it by O(h^(K+1-α))."""
+    counts = np.array([8, 12, 16, 24])
+    found = [damped_by(alpha, 3, count) for count in counts]
+    assert -np.polyfit(np.log(counts), np.log(found), 1)[0] == pytest.approx(4.0 - alpha, abs=0.25)
+
+
 def limited(law: PDAlpha, top: float, by: str, start: np.ndarray, horizon: float, tolerance: float) -> Trajectory:
     loop = ClosedLoop(RelativeMotion(), law, Saturation(top, by))  # type: ignore[arg-type]
     return ExplicitMemory(tolerance=tolerance).solve(loop, start, horizon)
