@@ -76,8 +76,9 @@ class ExplicitMemory:
 
     def supports(self, loop: ClosedLoop) -> str | None:
         """Return None for second-order plants under linear laws, otherwise why a loop is refused and the cure."""
-        if Need.DELAYS in loop.needs:
-            return f"the {self.name} solver takes linear laws, but this loop has delayed states; use 'method_of_steps'"
+        for need, use in ((Need.DELAYS, "method_of_steps"), (Need.NONLINEAR_LAW, "implicit_memory")):
+            if need in loop.needs:
+                return f"the {self.name} solver takes linear laws, but this loop has {need}; use '{use}'"
         if not _is_second_order(loop.plant):
             return (
                 f"the {self.name} solver takes plants whose states are m positions and then their rates, one control"
