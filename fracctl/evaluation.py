@@ -74,7 +74,7 @@ class Evaluation:
     objective: str
     """Name of the primary objective."""
     horizon: float
-    saturation: Saturation | None = None
+    saturation: Saturation | None = field(default=None, kw_only=True)
     """What the thrusters can give; None for any."""
 
     def __post_init__(self) -> None:
