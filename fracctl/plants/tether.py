@@ -51,7 +51,7 @@ class Tether(SecondOrder):
     These units vary along the orbit and two of the three positions are angles, so that there are no `scales`: metres
     are `length_m` λ, and `tension_n`, `torques_n_m`, `thruster_force_n` and `orbits` give the rest. The event
     ``collision`` is the tether's length falling to `shortest`: the two satellites meet, past it the equations mean
-    nothing.
+    nothing; ``escaped`` is its growing to `longest`, more than there is.
 
     Args:
         eccentricity: e in [0, 1).
@@ -64,6 +64,7 @@ class Tether(SecondOrder):
         disturbance: amplitudes d of the three rows, (3,) or (b, 3).
         disturbance_phase: in radians, () or (b,).
         shortest: λ at which two satellites meet.
+        longest: λ up to which there is tether on the reel.
 
     Raises:
         ArgumentError: the orbit is not an ellipse, a number is not positive, the bounds of the tension are not two
@@ -90,6 +91,7 @@ class Tether(SecondOrder):
         disturbance: ArrayLike = (0.05, 0.05, 0.05),
         disturbance_phase: ArrayLike = 0.0,
         shortest: float = 1e-4,
+        longest: float = 2.0,
     ) -> None:
         if not 0.0 <= eccentricity < 1.0:
             raise ArgumentError("eccentricity", eccentricity, "must lie in [0, 1)")
@@ -100,6 +102,7 @@ class Tether(SecondOrder):
             "subsatellite_mass_kg": subsatellite_mass_kg,
             "torque": torque,
             "shortest": shortest,
+            "longest": longest,
         }
         for name, value in given.items():
             if not (math.isfinite(value) and value > 0.0):
@@ -107,6 +110,7 @@ class Tether(SecondOrder):
         if not (len(tension) == 2 and 0.0 <= tension[0] < tension[1] < math.inf):
             raise ArgumentError("tension", tension, "must be two numbers, 0 <= least < largest")
         self.eccentricity, self.length_m, self.shortest = float(eccentricity), float(length_m), float(shortest)
+        self.longest = float(longest)
         self.perigee_km = EARTH_RADIUS_KM + perigee_altitude_km
         self.reduced_mass_kg = mother_mass_kg * subsatellite_mass_kg / (mother_mass_kg + subsatellite_mass_kg)
         self.rho, half = 0.5 * (tension[0] + tension[1]), 0.5 * (tension[1] - tension[0])
@@ -115,9 +119,13 @@ class Tether(SecondOrder):
 
     @property
     def events(self) -> tuple[Event, ...]:
-        """The meeting of the two satellites."""
+        """The meeting of the two satellites, and the end of the tether."""
         meaning = f"the tether's length fell to {self.shortest:g}, where the satellites meet and the equations end"
-        return (Event("collision", lambda _, x: x[:, 0] - self.shortest, meaning=meaning),)
+        run_out = f"the tether ran out to {self.longest:g} of its length"
+        return (
+            Event("collision", lambda _, x: x[:, 0] - self.shortest, meaning=meaning),
+            Event("escaped", lambda _, x: self.longest - x[:, 0], meaning=run_out),
+        )
 
     @property
     def orbital_period_s(self) -> float:

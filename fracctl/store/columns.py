@@ -22,17 +22,7 @@ TEXT = (
     *("law", "part", "limit", "verdict", "found_by", "found_for", "measure"),
 )
 """Columns that hold words."""
-_WHOLE = (
-    POINT,
-    "sample",
-    "samples",
-    "smallest_sample",
-    "largest_sample",
-    "run",
-    EVALUATIONS_SPENT,
-    "principal_poles",
-    "denominator",
-)
+_WHOLE = (POINT, "run", "samples", EVALUATIONS_SPENT, "principal_poles", "denominator")
 _FLAGS = ("stable", "all_poles_found")
 _UNITS = {
     "seconds_per_trajectory": "s",
