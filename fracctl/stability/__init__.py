@@ -1,4 +1,4 @@
-"""Verdicts on stability."""
+"""Verdicts on stability, and how far loops are from losing it."""
 
 from __future__ import annotations
 
@@ -6,7 +6,9 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from fracctl.stability.assess import Verdict, assess
+from fracctl.stability.margins import Margins, margins
 from fracctl.stability.matignon import PseudoStateVerdict, matignon
+from fracctl.stability.noise import noise_gain
 
 if TYPE_CHECKING:
     from fracctl.stability.families import FamilyMember, family, shoot_on_section
@@ -16,6 +18,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "FamilyMember",
+    "Margins",
     "Neighbourhood",
     "PeriodicOrbit",
     "PseudoStateVerdict",
@@ -23,8 +26,10 @@ __all__ = [
     "assess",
     "family",
     "largest_exponent",
+    "margins",
     "matignon",
     "multipliers",
+    "noise_gain",
     "nontrivial_multipliers",
     "real_above_one",
     "residual",
