@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -15,12 +16,15 @@ from fracctl.controllers.parameters import Parameter
 from fracctl.controllers.saturation import Saturation
 from fracctl.errors import ArgumentError, UnsupportedError
 from fracctl.loop import ClosedLoop
-from fracctl.measures.base import Measure
+from fracctl.measures.base import LoopMeasure, Measure
+from fracctl.measures.limits import Limit, excess
 from fracctl.plants.linear import LinearPlant
 from fracctl.solvers.base import Solver
 from fracctl.trajectory import Trajectory
 
 COUNTERS = ("nodes",)
+BEYOND_LIMITS = "beyond_limits"
+"""Status of a point that breaks a constraint."""
 
 
 class ParametrisedLaw(Protocol):
@@ -58,7 +62,8 @@ class Evaluation:
     """How a design point becomes a row for each initial condition.
 
     Raises:
-        ArgumentError: an objective names a column that no measure has, or the primary objective is unknown.
+        ArgumentError: an objective or a constraint names a column that no measure has, or the primary objective is
+            unknown.
     """
 
     plant: LinearPlant
@@ -76,13 +81,17 @@ class Evaluation:
     horizon: float
     saturation: Saturation | None = field(default=None, kw_only=True)
     """What the thrusters can give; None for any."""
+    loop_measures: tuple[LoopMeasure, ...] = field(default=(), kw_only=True)
+    """Measures of the loop, the same for all initial conditions."""
+    constraints: Mapping[str, Limit] = field(default_factory=dict, kw_only=True)
+    """Limits by measured column; what breaks them is no candidate for an optimum."""
 
     def __post_init__(self) -> None:
-        known = [column for measure in self.measures for column in measure.columns]
-        for name, columns in self.objectives.items():
-            for column in columns:
-                if column not in known:
-                    raise ArgumentError(f"objectives.{name}", repr(column), f"must name measured columns {known}")
+        known = list(self.measured_columns)
+        named = [(f"objectives.{name}", column) for name, columns in self.objectives.items() for column in columns]
+        for where, column in [*named, *(("constraints", column) for column in self.constraints)]:
+            if column not in known:
+                raise ArgumentError(where, repr(column), f"must name measured columns {known}")
         if self.objective not in self.objectives:
             raise ArgumentError("objective", repr(self.objective), f"must be one of {sorted(self.objectives)}")
 
@@ -98,12 +107,17 @@ class Evaluation:
         return tuple(parameter.name for parameter in self.law.parameters(self.plant.components))
 
     @cached_property
+    def measured_columns(self) -> tuple[str, ...]:
+        """Columns of all measures, those of trajectories first."""
+        kinds = ([m.columns for m in self.measures], [m.columns for m in self.loop_measures])
+        return tuple(itertools.chain.from_iterable(itertools.chain(*kinds)))
+
+    @cached_property
     def row_columns(self) -> tuple[str, ...]:
         """Columns of the rows, in order."""
-        measured = tuple(column for measure in self.measures for column in measure.columns)
         objectives = ("objective", *(f"objective_{name}" for name in self.objectives))
         tail = ("status", "stable", "error_estimate", *COUNTERS)
-        return ("initial_condition", *self.design_variables, *measured, *objectives, *tail)
+        return ("initial_condition", *self.design_variables, *self.measured_columns, *objectives, *tail)
 
     @property
     def axes(self) -> Mapping[str, Floats]:
@@ -127,8 +141,9 @@ class Evaluation:
         """Return the rows of b design points: all points of the first initial condition, then of the next.
 
         `status` is ``ok``, ``unsettled`` (no settling within the horizon, or a marginal loop), ``unstable``,
-        ``diverged``, ``failed`` (certificate not met) or the name of the plant's event that ended it. Measures of
-        trajectories that do not exist are +inf.
+        ``diverged``, ``failed`` (certificate not met), the name of the plant's event that ended it, or
+        ``beyond_limits`` where all is well but a constraint is broken. Measures of trajectories that do not exist are
+        +inf.
         """
         full = self._full_design(design)
         b, k = len(next(iter(full.values()))), len(self.initial_conditions)
@@ -138,12 +153,18 @@ class Evaluation:
         rows: dict[str, Array] = {"initial_condition": np.repeat(np.array(list(self.initial_conditions), object), b)}
         rows |= {name: np.tile(values, k) for name, values in full.items()}
         states = np.stack(list(self.initial_conditions.values()))
+        of_loop: dict[str, Floats] = {}
+        for measure in self.loop_measures:
+            of_loop |= {name: np.broadcast_to(values, (b,)) for name, values in measure.of_loop(loop).items()}
         for part in self.solver.survey(loop, states, self.horizon):
             where = (np.arange(k)[:, None] * b + part.rows).ravel()
-            for name, values in self._measured(part.trajectory).items():
+            own = {name: np.tile(values[part.rows], k) for name, values in of_loop.items()}
+            for name, values in self._rows(part.trajectory, own).items():
                 if name not in rows:
                     rows[name] = np.empty(k * b, dtype=values.dtype)
                 rows[name][where] = values
+        broken = (rows["status"] == "ok") & (excess(rows, self.constraints) > 0.0)
+        rows["status"][broken] = BEYOND_LIMITS
         return {name: rows[name] for name in self.row_columns}
 
     def solve(self, design: Mapping[str, float], initial_condition: str, horizon: float | None = None) -> Trajectory:
@@ -186,7 +207,7 @@ class Evaluation:
         arrays = {name: np.atleast_1d(np.asarray(value, dtype=np.float64)) for name, value in given.items()}
         return dict(zip(arrays, map(np.ascontiguousarray, np.broadcast_arrays(*arrays.values())), strict=True))
 
-    def _measured(self, trajectory: Trajectory) -> dict[str, Array]:
+    def _rows(self, trajectory: Trajectory, of_loop: Mapping[str, Floats]) -> dict[str, Array]:
         """Return measures, objectives, status and counters of one group of trajectories."""
         solved = np.isin(trajectory.status, ("ok", "failed"))
         values: dict[str, Array] = {}
@@ -195,8 +216,8 @@ class Evaluation:
                 values |= measure(trajectory)
             else:
                 values |= {column: np.full(len(solved), np.inf) for column in measure.columns}
-        rows = dict(values)
-        means = {name: geometric_mean([values[c] for c in columns]) for name, columns in self.objectives.items()}
+        rows: dict[str, Array] = {**values, **of_loop}
+        means = {name: geometric_mean([rows[c] for c in columns]) for name, columns in self.objectives.items()}
         rows["objective"] = means[self.objective]
         rows |= {f"objective_{name}": mean for name, mean in means.items()}
         status = trajectory.status.copy()

@@ -33,6 +33,7 @@ def explain(config: RunConfig, evaluation: Evaluation, survey: Survey) -> list[s
         ("evaluation", _sentence(evaluation, config.evaluation.type, _evaluated(config))),
         *_measures(config, evaluation),
         *_objectives(evaluation),
+        *_constraints(config),
         *_survey(config, evaluation, survey),
         ("scheduler", _scheduler(config)),
         ("figures", ", ".join(config.figures) or "none"),
@@ -101,13 +102,12 @@ def _initial_conditions(evaluation: Evaluation) -> Iterator[_Row]:
 
 
 def _measures(config: RunConfig, evaluation: Evaluation) -> Iterator[_Row]:
-    measures = zip(config.measures.items(), evaluation.measures, strict=False)
-    for place, ((name, options), measure) in enumerate(measures):
+    for place, (name, options) in enumerate(config.measures.items()):
         text = _options(options)
         threshold = getattr(options, "threshold", None) if name == "settling_time" else None
         if evaluation.plant.scales is not None and isinstance(threshold, float):
             text += f" ({number(threshold * evaluation.plant.scales.length_m)} m)"
-        yield "" if place else "measures", _sentence(measure, name, text)
+        yield "" if place else "measures", _sentence(registry.load("measures", name), name, text)
 
 
 def _objectives(evaluation: Evaluation) -> Iterator[_Row]:
@@ -118,6 +118,11 @@ def _objectives(evaluation: Evaluation) -> Iterator[_Row]:
         factors = evaluation.objectives[name]
         mean = f" = ({' · '.join(factors)})^(1/{len(factors)})" if len(factors) > 1 else ""
         yield "" if place else "minimises", f"{name}{mean}" + ("" if place else " (primary)")
+
+
+def _constraints(config: RunConfig) -> Iterator[_Row]:
+    for place, (name, text) in enumerate(config.constraints.items()):
+        yield "" if place else "optima have", f"{name} {text}"
 
 
 def extent(survey: Survey) -> str:

@@ -22,7 +22,8 @@ from fracctl.controllers import Saturation
 from fracctl.dispersions import Distribution
 from fracctl.errors import ArgumentError, ConfigurationError
 from fracctl.evaluation import Evaluation
-from fracctl.measures.base import TRAJECTORIES, trajectories_of
+from fracctl.measures.base import TRAJECTORIES, LoopMeasure, trajectories_of
+from fracctl.measures.limits import limit
 from fracctl.plants import LinearPlant
 from fracctl.surveys import Grid, Single, Survey, axis_values
 
@@ -46,9 +47,8 @@ def build_evaluation(config: RunConfig) -> Evaluation:
 
         options = config.evaluation.model_dump(exclude={"type"})
         return accuracy.AccuracyEvaluation(**common, measures=(), objectives={}, objective="", **options)
-    measures: tuple[Any, ...] = tuple(
-        construct(registry.load("measures", name), options) for name, options in config.measures.items()
-    )
+    made = [construct(registry.load("measures", name), options) for name, options in config.measures.items()]
+    measures: tuple[Any, ...] = tuple(measure for measure in made if not isinstance(measure, LoopMeasure))
     if isinstance(config.evaluation, ComparisonEvaluation):
         return _comparison(config, config.evaluation, common | {"measures": measures})
     common |= {
@@ -61,7 +61,13 @@ def build_evaluation(config: RunConfig) -> Evaluation:
         return _memory(given, config.seed, common)
     if isinstance(given, DelayedOptions | PerformanceOptions) and given.largest_control is not None:
         common["saturation"] = Saturation(given.largest_control, given.largest_by)
-    return _delayed(given, common) if isinstance(given, DelayedOptions) else Evaluation(**common)
+    if isinstance(given, DelayedOptions):
+        return _delayed(given, common)
+    return Evaluation(
+        **common,
+        loop_measures=tuple(measure for measure in made if isinstance(measure, LoopMeasure)),
+        constraints={column: limit(text) for column, text in config.constraints.items()},
+    )
 
 
 def _delayed(given: DelayedOptions, common: Mapping[str, Any]) -> Evaluation:
@@ -159,13 +165,30 @@ def _check_kinds(config: RunConfig) -> None:
 
 
 def _check_measures(config: RunConfig) -> None:
-    """Every kind of trajectories has measures of its own."""
+    """Every kind of trajectories has measures of its own; loops are measured, and limited, in one place."""
     wanted = _TRAJECTORIES.get(config.evaluation.type, "Trajectory")
     for name in config.measures:
         taken = trajectories_of(registry.load("measures", name))
         if taken not in (wanted, None):
             meant = f"is made for trajectories of {TRAJECTORIES[str(taken)]}, not of {TRAJECTORIES[wanted]}"
             raise ConfigurationError(f"measures.{name}: {meant}; choose others ('fracctl list measures')")
+    kind = config.evaluation.type
+    for name in config.measures if kind != "performance" else ():
+        if hasattr(registry.load("measures", name), "of_loop"):
+            raise ConfigurationError(f"measures.{name}: needs evaluation=performance, but evaluation.type = {kind}")
+    if config.constraints and kind != "performance":
+        raise ConfigurationError(f"constraints: need evaluation=performance, but evaluation.type = {kind}")
+    _check_controls(config)
+
+
+def _check_controls(config: RunConfig) -> None:
+    """Some measures of loops are for few controls only."""
+    controls = build_plant(config).n_controls
+    for name in config.measures:
+        most = getattr(registry.load("measures", name), "most_controls", controls)
+        if controls > most:
+            found = f"is made for {most} control, but {config.plant.type} has {controls}"
+            raise ConfigurationError(f"measures.{name}: {found}; take sensitivity, which has the disk margin")
 
 
 def _check_no_delay_is_given(config: RunConfig, source: str) -> None:

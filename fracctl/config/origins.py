@@ -17,6 +17,7 @@ _DETERMINED_BY: Mapping[str, tuple[str, ...]] = {
     "initial_condition": ("plant",),
     "survey": ("controller", "plant"),
     "objectives": ("measures",),
+    "constraints": ("measures",),
     "figures": ("initial_condition",),
 }
 """Groups that decide which keys another group may have."""

@@ -10,10 +10,11 @@ from pydantic import AfterValidator, Field, PlainValidator, SerializeAsAny, Vali
 from pydantic_core import InitErrorDetails
 
 from fracctl.config import parts
-from fracctl.config.fields import Folder, Name, Number, Strict, Typed, Whole, refusal, refuse
+from fracctl.config.fields import Folder, Name, Number, Strict, Typed, Whole, refusal, refuse, unknown
 from fracctl.config.options import factory_of
 from fracctl.dispersions import Distribution
 from fracctl.errors import ArgumentError, suggestion
+from fracctl.measures.limits import limit
 
 _COLUMN = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
@@ -251,6 +252,21 @@ def _objectives(value: dict[str, list[str]], info: ValidationInfo) -> dict[str, 
     return value
 
 
+def _constraints(value: dict[str, str], info: ValidationInfo) -> dict[str, str]:
+    columns = parts.measure_columns(info.data["measures"]) if "measures" in info.data else None
+    lines = []
+    for name, text in value.items():
+        if columns is not None and name not in columns:
+            lines.append(unknown((name,), text, columns))
+        try:
+            limit(text)
+        except ArgumentError as error:
+            lines.append(refusal((name,), text, error.allowed))
+    if lines:
+        raise refuse(*lines)
+    return value
+
+
 def _objective(value: str, info: ValidationInfo) -> str:
     lines = _absent("objectives", value, (), info)
     if lines:
@@ -301,6 +317,8 @@ class RunConfig(Strict):
     """Measure columns by the name of the objective that is their geometric mean."""
     objective: Annotated[str, AfterValidator(_objective)]
     """The primary one."""
+    constraints: Annotated[dict[str, str], AfterValidator(_constraints)] = Field(default_factory=dict)
+    """``>= number`` or ``<= number`` by measured column; a point that breaks one is no optimum."""
     survey: Annotated[Part, PlainValidator(_survey)]
     """Which design points are evaluated."""
     evaluation: Annotated[Part, PlainValidator(_evaluation)] = PerformanceEvaluation()

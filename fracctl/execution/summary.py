@@ -16,7 +16,8 @@ Optimum = Mapping[str, Any]
 
 _ADDED_COLUMNS = ("kind", "slice", "objective_name", POINT, REASON, SEARCHED_FOR)
 _OPTIMUM_NEEDS = (
-    "an optimum has status ok, is not unstable, has a finite value, and some control effort if that is part of it"
+    "an optimum has status ok, keeps to all constraints, is not unstable, has a finite value, and some control effort "
+    "if that is part of it"
 )
 
 

@@ -1,6 +1,6 @@
-"""Measures of performance, each a function of a batch of trajectories."""
+"""Measures of performance, each a function of a batch of trajectories, or of loops."""
 
-from fracctl.measures.base import Measure, MeshMeasure, StepwiseMeasure
+from fracctl.measures.base import LoopMeasure, Measure, MeshMeasure, StepwiseMeasure
 from fracctl.measures.boundedness import Boundedness, largest_distance
 from fracctl.measures.control_effort import ControlEffort, control_effort
 from fracctl.measures.delta_v import delta_v
@@ -13,6 +13,7 @@ from fracctl.measures.peak_acceleration import PeakAcceleration, peak_accelerati
 from fracctl.measures.periodicity_error import PeriodicityError, periodicity_error
 from fracctl.measures.settling_periods import SettlingPeriods, settling_periods
 from fracctl.measures.settling_time import SettlingTime, settling_time
+from fracctl.measures.stability_margins import NoiseGain, Sensitivity, StabilityMargins
 
 __all__ = [
     "Boundedness",
@@ -21,13 +22,17 @@ __all__ = [
     "DriftPerOrbit",
     "LengthOvershoot",
     "LengthSettling",
+    "LoopMeasure",
     "Measure",
     "MeshMeasure",
+    "NoiseGain",
     "Overshoot",
     "PeakAcceleration",
     "PeriodicityError",
+    "Sensitivity",
     "SettlingPeriods",
     "SettlingTime",
+    "StabilityMargins",
     "StepwiseMeasure",
     "control_effort",
     "delta_v",

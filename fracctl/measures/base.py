@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any, Protocol, runtime_checkable
 
 from fracctl.arrays import Floats
+from fracctl.loop import ClosedLoop
 from fracctl.meshwise import MeshTrajectory
 from fracctl.stepwise import StepwiseTrajectory
 from fracctl.trajectory import Trajectory
@@ -46,6 +47,18 @@ class MeshMeasure(Protocol):
         ...
 
 
+@runtime_checkable
+class LoopMeasure(Protocol):
+    """A named function of loops, wherever they start; `most_controls` says how many controls they may have, if few."""
+
+    name: str
+    columns: tuple[str, ...]
+
+    def of_loop(self, loop: ClosedLoop) -> dict[str, Floats]:
+        """Return each column as (b,)."""
+        ...
+
+
 TRAJECTORIES = {
     "Trajectory": "linear fractional loops",
     "StepwiseTrajectory": "the method of steps",
@@ -55,7 +68,12 @@ TRAJECTORIES = {
 
 
 def trajectories_of(kind: Any) -> str | None:
-    """Return the class of trajectories that a class of measures takes, by its annotations; None if it does not say."""
+    """Return the class of trajectories that a class of measures takes, by its annotations; None if it does not say.
+
+    Measures of loops go with the trajectories of linear ones.
+    """
+    if hasattr(kind, "of_loop"):
+        return "Trajectory"
     hint = next(iter(getattr(kind.__call__, "__annotations__", {}).values()), None)
     name = getattr(hint, "__name__", str(hint))
     return name if name in TRAJECTORIES else None

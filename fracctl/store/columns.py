@@ -31,6 +31,8 @@ _UNITS = {
     "threshold_m": "m",
     "_km": "km",
     "_deg": "deg",
+    "_db": "dB",
+    "delay_margin_s": "s",
     "_percent": "%",
     "_orbits": "orbits",
     "_periods": "periods",

@@ -162,7 +162,7 @@ def _check_size(name: str, value: int, least: int) -> None:
 
 
 def _limits(constraints: Mapping[str, float], evaluation: Evaluation) -> dict[str, float]:
-    measured = [column for measure in evaluation.measures for column in measure.columns]
+    measured = evaluation.measured_columns
     for column, limit in constraints.items():
         _check_name(f"constraints.{column}", column, measured)
         if not (math.isfinite(limit) and limit > 0.0):

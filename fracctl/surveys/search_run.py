@@ -8,15 +8,13 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from fracctl.arrays import Array, Booleans, Floats, joined
-from fracctl.evaluation import Evaluation
+from fracctl.evaluation import BEYOND_LIMITS, Evaluation
 from fracctl.measures import Measure
 from fracctl.measures.final_distance import FinalDistance
+from fracctl.measures.limits import excess as beyond_constraints
 from fracctl.surveys.base import EVALUATIONS_SPENT, POINT, SEARCHED_FOR, Rows
 from fracctl.surveys.optima import candidates
 from fracctl.surveys.search_algorithms import Optimiser, non_dominated
-
-BEYOND_LIMITS = "beyond_limits"
-"""Status of a point that breaks a constraint."""
 
 _EXCESS, _UNSETTLED, _WORST = 1e9, 1e12, 1e15
 """Values that points get which are no candidates; no objective is as large."""
@@ -73,7 +71,7 @@ class SeededSearch:
         for spent in range(0, self.evaluations, self.population):
             asked = [optimiser.ask()[: self.evaluations - spent] for optimiser in optimisers]
             rows = watched(self._design(np.concatenate(asked), starts, len(asked[0])))
-            values, admissible = self._values(rows, evaluation.objectives)
+            values, admissible = self._values(rows, watched)
             rows = {name: rows[name] for name in evaluation.row_columns}
             parts = np.arange(len(values)).reshape(len(asked), -1)
             for part, optimiser, record in zip(parts, optimisers, records, strict=True):
@@ -99,11 +97,13 @@ class SeededSearch:
         varied = {variable.name: np.ascontiguousarray(points[:, i]) for i, variable in enumerate(self.variables)}
         return {name: np.repeat(values, size) for name, values in starts.items()} | varied
 
-    def _values(self, rows: Rows, objectives: Mapping[str, Sequence[str]]) -> tuple[Floats, Booleans]:
+    def _values(self, rows: Rows, evaluation: Evaluation) -> tuple[Floats, Booleans]:
         """Return what is minimised, (n, k), and which rows may be optima, (n,); marks those beyond the limits."""
         values = np.stack([rows[f"objective_{name}"] for name in self.objectives], axis=1)
+        objectives = evaluation.objectives
         sound = np.logical_and.reduce([candidates(rows, name, objectives[name]) for name in self.objectives])
-        excess = np.zeros(len(values))
+        broken = rows["status"] == BEYOND_LIMITS
+        excess = np.where(broken, beyond_constraints(rows, evaluation.constraints), 0.0)
         for column, limit in self.limits.items():
             excess[sound] += np.maximum(rows[column][sound] / limit - 1.0, 0.0)
         beyond = excess > 0.0

@@ -11,11 +11,11 @@ import pytest
 
 from fracctl.controllers import Parameter
 from fracctl.errors import ArgumentError
+from fracctl.evaluation import BEYOND_LIMITS
 from fracctl.measures import Measure
 from fracctl.plants import LinearPlant
 from fracctl.surveys import Block, PopulationSearch
 from fracctl.surveys.search_algorithms import ALGORITHMS
-from fracctl.surveys.search_run import BEYOND_LIMITS
 
 BOUNDS = {"gains": [-4.0, 4.0], "orders": [0.5, 1.0]}
 
@@ -42,6 +42,8 @@ class Bowls:
 
     initial_conditions: Mapping[str, Any] = field(default_factory=lambda: {"one": np.ones(2), "two": np.ones(2)})
     measures: tuple[Measure, ...] = (Column("time"), Column("size"))  # type: ignore[assignment]
+    measured_columns = ("time", "size")
+    constraints: Mapping[str, Any] = field(default_factory=dict)
     objectives: Mapping[str, tuple[str, ...]] = field(default_factory=lambda: {"t": ("time",), "s": ("size",)})
     objective: str = "t"
     parameters: Mapping[str, float] = field(default_factory=lambda: {"alpha": 1.0, "p": 0.0, "q": 0.0})
