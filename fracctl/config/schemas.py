@@ -176,6 +176,8 @@ class Figure(Typed):
         "order_contours",
         "pareto_fronts",
         "poles",
+        "bode",
+        "nyquist",
         "work_precision",
         "settling_against_band",
         "settling_against_effort",

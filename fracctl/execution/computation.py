@@ -17,6 +17,7 @@ from fracctl.evaluation import COUNTERS, Conclusion
 from fracctl.execution.cross_check import CrossCheck
 from fracctl.execution.drawing import draw_figures
 from fracctl.execution.executors import Executors, n_workers
+from fracctl.execution.frequency_response import frequency_responses
 from fracctl.execution.poles import COLUMNS as POLE_COLUMNS
 from fracctl.execution.poles import Poles
 from fracctl.execution.progress import Progress
@@ -201,3 +202,6 @@ class Computation:
         times = np.linspace(0.0, self._evaluation.horizon, self._evaluation.trajectory_samples)
         rows = trajectories(self._evaluation, shown, times)
         self._directory.write_trajectories(schema(tuple(rows), metadata=self._metadata), rows)
+        if self._evaluation.has_poles:
+            responses = frequency_responses(self._evaluation, shown)
+            self._directory.write_frequency_response(schema(tuple(responses), metadata=self._metadata), responses)

@@ -12,11 +12,13 @@ from matplotlib.figure import Figure
 
 from fracctl.errors import ConfigurationError, FracctlError, suggestion
 from fracctl.figures import (
+    bode,
     deployment,
     drift,
     feedback,
     gain_contours,
     multiplier_window,
+    nyquist,
     objective_against_order,
     orbits,
     order_contours,
@@ -41,6 +43,8 @@ TYPES: Mapping[str, Callable[[Results, Selection], tuple[Figure, pd.DataFrame]]]
     "order_contours": order_contours.build,
     "pareto_fronts": pareto_fronts.build,
     "poles": poles.build,
+    "bode": bode.build,
+    "nyquist": nyquist.build,
     "work_precision": work_precision.build,
     "settling_against_band": settling_against_band.build,
     "settling_against_effort": settling_against_effort.build,

@@ -76,6 +76,11 @@ class Results:
         return self.run.poles()
 
     @cached_property
+    def frequency_response(self) -> pd.DataFrame:
+        """Loop gains and sensitivities of the points that figures show."""
+        return self.run.frequency_response()
+
+    @cached_property
     def components(self) -> tuple[str, ...]:
         """Names of the controlled positions."""
         columns = map(str, self.trajectories.columns)

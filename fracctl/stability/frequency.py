@@ -60,6 +60,16 @@ class FrequencyResponse:
         shape = (rows.size, omega.shape[1], m, m)
         return np.broadcast_to(control, shape), np.broadcast_to(plant, shape)
 
+    @property
+    def resonances(self) -> Floats:
+        """|Im| of the plant's poles, those that are 0 left out."""
+        m = self.controls
+        matrix = np.block([[np.zeros((m, m)), np.eye(m)], [self._stiffness, self._damping]])
+        poles = np.linalg.eigvals(matrix)
+        heights = poles.imag[poles.imag > 1e-6 * np.abs(poles).max(initial=0.0)]
+        # eigenvalues are exact to rounding only, and the poles of HCW lie at ±i
+        return np.unique(np.round(heights, 12))
+
     def grid(self) -> Floats:
         """Return frequencies (k,) for all members: logarithmic, and close around the plant's resonances.
 
@@ -70,17 +80,8 @@ class FrequencyResponse:
         radius = pole_radius(self.matrix)
         low, high = np.log10(_LOWEST * min(1.0, float(radius.min()))), np.log10(_HIGHEST * float(radius.max()))
         even = np.logspace(low, high, 1 + int(_PER_DECADE * (high - low)))
-        near = (_resonances(self._stiffness, self._damping)[:, None] * (1.0 + _NEAR_RESONANCES)).ravel()
+        near = (self.resonances[:, None] * (1.0 + _NEAR_RESONANCES)).ravel()
         return np.unique(np.concatenate([even, near]))
-
-
-def _resonances(stiffness: Floats, damping: Floats) -> Floats:
-    """Return |Im| of the plant's poles, those that are 0 left out."""
-    m = len(stiffness)
-    poles = np.linalg.eigvals(np.block([[np.zeros((m, m)), np.eye(m)], [stiffness, damping]]))
-    heights = poles.imag[poles.imag > 1e-6 * np.abs(poles).max(initial=0.0)]
-    # eigenvalues are exact to rounding only, and the poles of HCW lie at ±i
-    return np.unique(np.round(heights, 12))
 
 
 def _sum(terms: Sequence[FractionalTerm], omega: Floats, rows: Array) -> Complexes:

@@ -29,6 +29,7 @@ class RunDirectory:
         self.evaluations_path = self.path / "evaluations.parquet"
         self.optima_path = self.path / "optima.parquet"
         self.poles_path = self.path / "poles.parquet"
+        self.frequency_response_path = self.path / "frequency_response.parquet"
         self.trajectories_path = self.path / "trajectories.parquet"
         self.figures = self.path / "figures"
         self.parts = self.path / manifest.PARTS
@@ -95,6 +96,10 @@ class RunDirectory:
         """Return poles and pseudo-state eigenvalues of the overall and baseline optima; `run` is their row."""
         return tables.to_pandas(tables.read(self.poles_path))
 
+    def frequency_response(self) -> pd.DataFrame:
+        """Return the frequency responses of the overall and baseline optima; `run` is their row."""
+        return tables.to_pandas(tables.read(self.frequency_response_path))
+
     def write_evaluations(self, schema: pa.Schema, parts: Iterable[pa.Table]) -> None:
         """Join the parts."""
         tables.write(self.evaluations_path, schema, parts)
@@ -106,6 +111,10 @@ class RunDirectory:
     def write_poles(self, schema: pa.Schema, rows: Mapping[str, Array]) -> None:
         """Write the poles."""
         tables.write(self.poles_path, schema, [to_table(rows, schema)])
+
+    def write_frequency_response(self, schema: pa.Schema, rows: Mapping[str, Array]) -> None:
+        """Write the frequency responses."""
+        tables.write(self.frequency_response_path, schema, [to_table(rows, schema)])
 
     def write_trajectories(self, schema: pa.Schema, rows: Mapping[str, Array]) -> None:
         """Write the trajectories."""

@@ -68,7 +68,7 @@ def files_of(path: Path) -> set[str]:
 
 
 def test_the_directory_holds_what_the_design_says(undisturbed: Path) -> None:
-    tables = {f"{name}.parquet" for name in ("evaluations", "optima", "poles", "trajectories")}
+    tables = {f"{name}.parquet" for name in ("evaluations", "optima", "poles", "frequency_response", "trajectories")}
     assert files_of(undisturbed) == tables | {"run.json", "run.log", "manifest.sha256"}
     assert RunDirectory(undisturbed).verify() == []
     assert undisturbed.parent.name == "fake"
