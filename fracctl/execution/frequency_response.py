@@ -11,7 +11,7 @@ import pandas as pd
 from fracctl.arrays import Array, Floats, joined
 from fracctl.characteristic.bounds import pole_radius
 from fracctl.evaluation import Evaluation
-from fracctl.stability.frequency import FrequencyResponse
+from fracctl.stability.frequency import FrequencyResponse, over
 from fracctl.stability.margins import gain
 
 _LOWEST, _LEAST_HIGHEST, _PER_DECADE = 1e-2, 1e2, 300
@@ -37,15 +37,14 @@ def _response(evaluation: Evaluation, row: Mapping[Any, Any], run: int) -> dict[
     response = FrequencyResponse(loop)
     omega = _grid(response)
     control, plant = (values[0] for values in response(omega[None], np.zeros(1, dtype=np.int64)))
-    closed = np.linalg.inv(plant + control)
     encircling = np.linalg.det(plant + control) / np.linalg.det(plant) - 1.0
     return {
         "run": np.full(omega.size, run),
         "frequency": omega,
         "loop_real": encircling.real,
         "loop_imag": encircling.imag,
-        "sensitivity": gain(plant @ closed),
-        "complementary": gain(control @ closed),
+        "sensitivity": gain(over(plant, plant + control)),
+        "complementary": gain(over(control, plant + control)),
     }
 
 

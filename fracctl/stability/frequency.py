@@ -84,6 +84,18 @@ class FrequencyResponse:
         return np.unique(np.concatenate([even, near]))
 
 
+def over(numerator: Complexes, denominator: Complexes) -> Complexes:
+    """Return A B⁻¹ of matrices (…, m, m); in closed form for m ≤ 2, which is most of the work of a survey."""
+    size = denominator.shape[-1]
+    if size == 1:
+        return numerator / denominator
+    if size > 2:
+        return numerator @ np.linalg.inv(denominator)
+    a, b, c, d = (denominator[..., i, j] for i, j in ((0, 0), (0, 1), (1, 0), (1, 1)))
+    adjugate = np.stack([np.stack([d, -b], axis=-1), np.stack([-c, a], axis=-1)], axis=-2)
+    return numerator @ (adjugate / (a * d - b * c)[..., None, None])
+
+
 def _sum(terms: Sequence[FractionalTerm], omega: Floats, rows: Array) -> Complexes:
     """Return Σ G (iω)^β, (n or 1, k, r, p)."""
     total: Complexes = np.zeros((1, 1, 1, 1), dtype=np.complex128)

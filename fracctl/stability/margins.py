@@ -12,7 +12,7 @@ from fracctl.characteristic.winding import unstable_zeros
 from fracctl.loop import ClosedLoop
 from fracctl.plants.linear import LinearPlant
 from fracctl.stability.extremes import largest, roots
-from fracctl.stability.frequency import NEXT_TO_ZERO, FrequencyResponse
+from fracctl.stability.frequency import NEXT_TO_ZERO, FrequencyResponse, over
 
 _AT_ONCE = 512
 """Members whose curves are held in memory together."""
@@ -139,7 +139,7 @@ def _peaks(response: FrequencyResponse, rows: Array, grid: Floats, on_grid: _Pai
 def _sensitivity(pair: _Pair, kind: int) -> Floats:
     """Return σ_max of S, T or S - T."""
     control, plant = pair
-    return gain((plant, control, plant - control)[kind] @ np.linalg.inv(plant + control))
+    return gain(over((plant, control, plant - control)[kind], plant + control))
 
 
 def _gain_margins(response: FrequencyResponse, rows: Array, grid: Floats, on_grid: _Pair) -> dict[str, Floats]:

@@ -10,7 +10,7 @@ from fracctl.arrays import Array, Floats
 from fracctl.characteristic.winding import unstable_zeros
 from fracctl.errors import ArgumentError
 from fracctl.loop import ClosedLoop
-from fracctl.stability.frequency import FrequencyResponse
+from fracctl.stability.frequency import FrequencyResponse, over
 
 SAMPLE_PERIOD = 6.313e-3
 """10 s at the mean motion of a chief at 10 000 km."""
@@ -54,7 +54,7 @@ def noise_gain(loop: ClosedLoop, sample_period: float = SAMPLE_PERIOD) -> Any:
 def _power(response: FrequencyResponse, omega: Floats, rows: Array) -> Floats:
     """Return ‖C S_o‖_F², (n, k), S_o the sensitivity at the plant's output."""
     control, plant = response(omega[None], rows)
-    through = control @ np.linalg.inv(plant + control) @ plant
+    through = over(control, plant + control) @ plant
     power: Floats = (np.abs(through) ** 2).sum(axis=(-2, -1))
     return power
 

@@ -205,6 +205,8 @@ def test_the_published_optima_of_ic1() -> None:
     """PD 84°, PD^α 71-78°, PD with lag 50°; M_s 1.0, 1.0, 1.4."""
     pd, pd_alpha, lag = of(PD(0.55, 2.0)), of(PDAlpha(0.85, 2.0, 0.91)), of(PDLag(1.3, 2.0, 0.2))
     assert [pd.phase_margin_deg, pd_alpha.phase_margin_deg] == pytest.approx([84.0, 71.0], abs=0.5)
+    ic2 = of(PDAlpha(0.75, 1.95, 0.97))
+    assert ic2.phase_margin_deg == pytest.approx(78.0, abs=0.6)
     assert lag.phase_margin_deg == pytest.approx(50.0, abs=0.6)
     peaks = [pd.sensitivity_peak, pd_alpha.sensitivity_peak, lag.sensitivity_peak]
     assert peaks == pytest.approx([1.0, 1.0, 1.4], abs=0.05)
