@@ -127,7 +127,14 @@ def test_documents_name_targets_that_exist() -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["README.md", "docs/time_delayed_feedback.md", "docs/method_of_steps.md", "docs/fractional_memory.md"]
+    "name",
+    [
+        "README.md",
+        "docs/time_delayed_feedback.md",
+        "docs/method_of_steps.md",
+        "docs/fractional_memory.md",
+        "docs/margins.md",
+    ],
 )
 def test_documents_show_what_comes_out(name: str) -> None:
     failures, tests = doctest.testfile(str(ROOT / name), module_relative=False)

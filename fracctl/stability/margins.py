@@ -115,7 +115,7 @@ def margins(loop: ClosedLoop) -> Margins:
     assert isinstance(loop.plant, LinearPlant)
     if loop.plant.scales is not None:
         found["delay_margin_s"] = found["delay_margin"] * loop.plant.scales.time_s
-    return Margins(**({name: column[0] for name, column in found.items()} if loop.batch is None else found))
+    return Margins(**({name: column.tolist()[0] for name, column in found.items()} if loop.batch is None else found))
 
 
 def _peaks(response: FrequencyResponse, rows: Array, grid: Floats, on_grid: _Pair) -> dict[str, Floats]:

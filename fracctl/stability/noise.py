@@ -48,7 +48,7 @@ def noise_gain(loop: ClosedLoop, sample_period: float = SAMPLE_PERIOD) -> Any:
     for first in range(0, sound.size, _AT_ONCE):
         rows = sound[first : first + _AT_ONCE]
         found[rows] = np.sqrt(_power(response, omega, rows) @ weights)
-    return found[0] if loop.batch is None else found
+    return float(found[0]) if loop.batch is None else found
 
 
 def _power(response: FrequencyResponse, omega: Floats, rows: Array) -> Floats:

@@ -91,6 +91,18 @@ def test_show_says_what_a_search_does(capsys: pytest.CaptureFixture[str]) -> Non
     assert lines(capsys, "validate", "experiment=inplane") == ["valid: inplane, 1326 searches, 3 initial conditions"]
 
 
+def test_show_says_what_optima_must_keep_to(capsys: pytest.CaptureFixture[str]) -> None:
+    limits = ['constraints.phase_margin_deg=">= 60"', 'constraints.noise_gain="<= 400"']
+    text = "\n".join(lines(capsys, "show", "experiment=ic1_margins", *limits))
+    for part in (
+        "stability_margins: Gain, phase and delay that bring a pole to the imaginary axis",
+        "noise_gain, sample_period 0.006313",
+        "optima have  phase_margin_deg >= 60\n",
+        "noise_gain <= 400\n",
+    ):
+        assert part in text
+
+
 def test_show_without_units(capsys: pytest.CaptureFixture[str]) -> None:
     words = ["plant=linear", "controller=pd_alpha_own", "initial_condition=own", "initial_condition.own.x=1"]
     text = "\n".join(lines(capsys, "show", *words))
