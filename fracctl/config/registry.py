@@ -72,6 +72,7 @@ BUILT_IN: Mapping[str, Mapping[str, str]] = {
         "lyapunov_exponent": "fracctl.measures.lyapunov_exponent:LyapunovExponent",
         "largest_multiplier": "fracctl.measures.largest_multiplier:LargestMultiplier",
         "length_settling": "fracctl.measures.length_settling:LengthSettling",
+        "late_deviation": "fracctl.measures.late_deviation:LateDeviation",
         "length_overshoot": "fracctl.measures.length_overshoot:LengthOvershoot",
         "first_reversal": "fracctl.measures.first_reversal:FirstReversal",
         "angle_settling": "fracctl.measures.angle_settling:AngleSettling",

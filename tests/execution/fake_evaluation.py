@@ -45,6 +45,8 @@ class FakeEvaluation:
     measures = ()
     solver = Contour()
     has_poles = True
+    sliced_by = None
+    trajectory_kinds = ("overall", "baseline")
     trajectory_samples = 2001
     sampled_columns = ("w", "w_dot", "control_w")
 
