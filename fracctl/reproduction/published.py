@@ -23,8 +23,11 @@ UNITS: Mapping[str, float] = {
     "1e-6 km": 1e-6,
     "1e-8 km": 1e-8,
     "m/s": 1.0,
+    "orbits": 1.0,
+    "percent": 1.0,
 }
-"""One unit of a printed number in that of its column: ``1e-3`` heads a column "× 10⁻³", T_orb is the chief's period."""
+"""One unit of a printed number in that of its column: ``1e-3`` heads a column "× 10⁻³", T_orb is the chief's period; of
+columns that hold a period or a per cent as 1, the unit is ``orbits`` or ``percent``."""
 
 _COLUMNS = ("id", "place", "quantity", "unit", "published", "tolerance", "expected", "reason")
 _PRINTED = re.compile(r"(?:([<>]) )?(-?\d+(?:\.\d+)?)")

@@ -11,6 +11,7 @@ from numba import types
 from fracctl.arrays import Array, Floats
 from fracctl.compiling import ACCELERATION, DEMAND, called, helper, pointer_with
 from fracctl.solvers.implicit_memory_equations import (
+    CONTROL,
     D_KNOWN,
     D_SHARE,
     ERROR_RATE,
@@ -108,6 +109,15 @@ def _before(ratio: float) -> tuple[float, float]:
 
 
 @called
+def _limited(found: Floats, known: Floats) -> int:
+    """Return which controls are at which limit, as one number."""
+    total = 0
+    for i in range(found.shape[1]):
+        total = 3 * total + (found[CONTROL, i] <= known[LOWER, i]) + 2 * (found[CONTROL, i] >= known[UPPER, i])
+    return total
+
+
+@called
 def _taken(
     n: int,
     v: Floats,
@@ -190,13 +200,17 @@ def march(
     z, base, peaks = np.empty(auxiliary.shape[1]), np.empty(auxiliary.shape[1]), np.abs(auxiliary[0])
     v, matrix = np.empty(m), np.full((m, 2 * m), np.nan)
     decay, early, late = np.empty(len(rates)), np.empty(len(rates)), np.empty(len(rates))
-    h = 0.0
+    h, limited = 0.0, -1
     for n in range(len(times) - 1):
         ratio, h = (times[n + 1] - times[n]) / h if n else 0.0, times[n + 1] - times[n]
         if abs(ratio - 1.0) > 1e-12:
             _filters(rates, h, decay, early, late)
             for i in range(m):
                 known[D_SHARE, i] = h ** (1.0 - orders[i]) / math.gamma(3.0 - orders[i])
+        at_limits = _limited(found, known)
+        if at_limits != limited:
+            ratio = 0.0
+        limited = at_limits
         _known_of_the_end(n, ratio, states, reference, reference_rate, orders, weights, decay, modes, known)
         one, two = _before(ratio)
         for k in range(len(z)):
