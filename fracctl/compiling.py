@@ -93,6 +93,8 @@ def helper_with(**options: Any) -> Callable[[_Function], _Function]:
 called = helper_with(error_model="numpy", forceinline=False)
 """The decorator of functions that only kernels call and that are not copied into them: too long, or called at many
 places. Their arithmetic is not reordered, so that all compiled copies give the same bits."""
+within = helper_with(error_model="numpy")
+"""The same for functions that are copied into the one kernel that calls them."""
 _ARITHMETIC: dict[str, Any] = {"error_model": "numpy", "fastmath": {"reassoc", "contract", "nsz", "arcp"}}
 """Arithmetic that may be reordered and divides by zero as NumPy does."""
 compiled = compiled_with(**_ARITHMETIC)

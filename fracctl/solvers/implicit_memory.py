@@ -25,9 +25,9 @@ _RUNG = 1.2
 _LOG_RUNG = float(np.log(_RUNG))
 _MOST_GROWTH = 0.3
 """Far below √2, where BDF2 with growing steps ends to be stable."""
-_PILOT = 8.0
-"""Steps of the run that tells where longer ones will do, over those of the coarse run."""
-_NEAR, _LONGEST = 4, 10.0
+_PILOT, _FIRST = 2.0, 1e-5
+"""Steps of the run that tells where shorter and longer ones will do, over those of the coarse run; its first one."""
+_NEAR, _SHORTEST, _LONGEST = 4, 1.0 / 8.0, 10.0
 """Steps of it to both sides that must be smooth too, and by what steps may be longer at most."""
 _BISECTIONS = 60
 
@@ -35,18 +35,19 @@ _BISECTIONS = 60
 class ImplicitMemory:
     """BDF2 on a graded mesh, the memory as a sum of exponentials.
 
-    The first steps grow from `first_step` to `step`, by 15 times `step` each: a torque on a short tether and a
+    The first steps grow from `first_step`, by 15 times `step` each: a torque on a short tether and a
     derivative of Riemann and Liouville are both singular at the start. Each step solves for the m rates at its end by
     Newton's method with differences, whose derivatives are kept as long as they serve, and where that does not converge
     (a control that jumps to the other limit) by bracketing one row after the other, each of which grows with its own
     rate. The derivative D^ν is that of rates linear in each step: exact in the step itself, by decaying modes before.
     Error O(step²), away from kinks of the limits.
 
-    The run is made twice, with `step` and on a mesh with half of each step; the second is returned, and the difference
-    is its error estimate, three times too large where the error is regular.
+    A pilot run tells where the motion is smooth, for steps of up to 10 times `step`, and where it bends or a control
+    comes to a limit, for an eighth of it. The run is then made twice, on that mesh and with each of its steps halved;
+    the second is returned, and the difference is its error estimate, three times too large where the error is regular.
 
     Args:
-        step: largest step of the coarse run, in the plant's time.
+        step: step of the coarse run, in the plant's time, where the motion bends as the unit of rates in that of time.
         first_step: first one.
         memory_tolerance: largest relative error of the kernel of the memory.
         tolerance: error estimate above which a member is ``failed``; 0 accepts any.
@@ -61,7 +62,7 @@ class ImplicitMemory:
 
     def __init__(
         self,
-        step: float = 2e-3,
+        step: float = 4e-3,
         first_step: float = 1e-9,
         memory_tolerance: float = 1e-8,
         tolerance: float = 0.0,
@@ -108,7 +109,7 @@ class ImplicitMemory:
         horizon = positive("horizon", horizon)
         problem = _Problem(loop, start, self.memory_tolerance)
         with np.errstate(all="ignore"):
-            pilot = problem.on(graded_mesh(self.first_step, _PILOT * self.step, horizon))
+            pilot = problem.on(graded_mesh(max(self.first_step, _FIRST), _PILOT * self.step, horizon))
             mesh = graded_mesh(self.first_step, self.step, horizon, _smooth(pilot))
             coarse, fine = problem.on(mesh), problem.on(halved(mesh))
         return self._trajectory(loop, coarse, fine, loop.batch is not None or given.ndim == 2)
@@ -170,7 +171,7 @@ def graded_mesh(first: float, largest: float, horizon: float, longer: tuple[Floa
         made += 1
         while k < last and since[k + 1] <= t:
             k += 1
-        highest = int(np.log(stretch[k]) / _LOG_RUNG + 1e-9)
+        highest = int(np.floor(np.log(stretch[k]) / _LOG_RUNG + 1e-9))
         if rung > highest:
             rung, made = highest, 0
             h = largest * _RUNG**rung
@@ -188,7 +189,7 @@ def _smooth(pilot: _Run) -> tuple[Floats, Floats]:
     bends = np.abs(np.diff(slopes, axis=1)).max(axis=(0, 2)) / (0.5 * (h[1:] + h[:-1]))
     bends = np.where(np.isfinite(bends), bends, np.inf)
     near = np.maximum.reduce([np.roll(bends, k) for k in range(-_NEAR, _NEAR + 1)])
-    return pilot.times[1:-1], np.clip(near**-0.5, 1.0, _LONGEST)
+    return pilot.times[1:-1], np.clip(near**-0.5, _SHORTEST, _LONGEST)
 
 
 def halved(mesh: Floats) -> Floats:

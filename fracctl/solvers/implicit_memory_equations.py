@@ -6,12 +6,15 @@ import math
 from typing import Any
 
 from fracctl.arrays import Floats
-from fracctl.compiling import called
+from fracctl.compiling import called, within
 
 _MOST_ITERATIONS, _MOST_SWEEPS, _MOST_HALVINGS = 12, 60, 200
+_WIDEST, _ROUGH = 1e12, 1e-3
 _CLOSE = 1e-10
 """Change of the rates, relative to 1 + |rate|, at which an iteration ends."""
-_FAST = 0.1
+_NEAR = 1e-9
+"""The same for a first iteration that is known to be the last: what is stored beside the rates is that before it."""
+_FAST, _LEAST_RATE = 0.1, 1e-3
 _STEP_OF_DIFFERENCES = 1e-8
 Q_KNOWN, V_KNOWN, D_KNOWN, D_SHARE, Q_WANTED, V_WANTED, LOWER, UPPER = range(8)
 """Rows of what a step knows of its end: q = Q + c v, v' = (v - V)/c, D = D_K + share Δv, q_d, q_d', control limits."""
@@ -19,8 +22,8 @@ Q, ERROR, ERROR_RATE, D, WANTED, CONTROL, RATE, RESIDUAL, START, KEPT = range(10
 """Rows of what follows from the rates v at the end of a step."""
 
 
-@called
-def respond(
+@within
+def _respond(
     acceleration: Any,
     demand: Any,
     t: float,
@@ -49,6 +52,25 @@ def respond(
 
 
 @called
+def respond(
+    acceleration: Any,
+    demand: Any,
+    t: float,
+    c: float,
+    v: Floats,
+    known: Floats,
+    base: Floats,
+    peaks: Floats,
+    plant: Floats,
+    law: Floats,
+    found: Floats,
+    z: Floats,
+) -> None:
+    """Fill `found` and `z` from the rates v at the end of a step; not copied into its callers."""
+    _respond(acceleration, demand, t, c, v, known, base, peaks, plant, law, found, z)
+
+
+@within
 def newton(
     acceleration: Any,
     demand: Any,
@@ -63,27 +85,29 @@ def newton(
     found: Floats,
     z: Floats,
     matrix: Floats,
+    rate: Floats,
 ) -> int:
     """Solve for the rates v; return the iterations, or their negative number if they do not end.
 
     Newton's method with the derivatives of an earlier step, whose inverse is in the last columns of `matrix` (m, 2m),
-    and with new ones, by differences, where each iteration does not take nine tenths off the last one.
+    and with new ones, by differences, where an iteration does not take nine tenths off the last one. `rate` (1,) holds
+    what the iterations of earlier steps left of each other, by which a first one can be known to be the last.
     """
     last = math.inf
     for iteration in range(_MOST_ITERATIONS):
-        respond(acceleration, demand, t, c, v, known, base, peaks, plant, law, found, z)
+        _respond(acceleration, demand, t, c, v, known, base, peaks, plant, law, found, z)
         size = _moved(v, found, matrix)
-        if size <= _CLOSE and size <= _FAST * last and iteration:
+        if iteration:
+            rate[0] = max(size / last, _LEAST_RATE) if last > 0.0 else _LEAST_RATE
+        if size <= _NEAR and size * rate[0] <= _CLOSE and rate[0] <= _FAST:
             return iteration + 1
-        if iteration and not size <= _FAST * last:
-            return _with_new_derivatives(
-                acceleration, demand, t, c, v, known, base, peaks, plant, law, found, z, matrix, iteration + 1
-            )
-        if not math.isfinite(size):
+        if not size <= _FAST * last:
+            rate[0] = 1.0
             return _with_new_derivatives(
                 acceleration, demand, t, c, v, known, base, peaks, plant, law, found, z, matrix, iteration + 1
             )
         last = size
+    rate[0] = 1.0
     return -_MOST_ITERATIONS
 
 
@@ -125,6 +149,7 @@ def _with_new_derivatives(
         if not _inverted(matrix):
             return -before - iteration - 1
         if _moved(v, found, matrix) <= _CLOSE:
+            respond(acceleration, demand, t, c, v, known, base, peaks, plant, law, found, z)
             return before + iteration + 1
     return -before - _MOST_ITERATIONS
 
@@ -206,41 +231,73 @@ def bracketed(
     law: Floats,
     found: Floats,
     z: Floats,
+    matrix: Floats,
 ) -> bool:
-    """Solve row after row by bisection, each grows with its own rate, until the rates stay; return whether they do."""
+    """Solve row after row by bisection, each grows with its own rate, until Newton's method converges or they stay."""
+    precision = _ROUGH
     for _ in range(_MOST_SWEEPS):
         largest = 0.0
         for i in range(len(v)):
             before = v[i]
-            width = 1e-6 * (1.0 + abs(before))
-            low = high = before
-            below = above = _residual_at(
-                acceleration, demand, t, c, v, i, before, known, base, peaks, plant, law, found, z
-            )
-            while below > 0.0 and width < 1e12:
-                high, above = low, below
-                low -= width
-                width *= 4.0
-                below = _residual_at(acceleration, demand, t, c, v, i, low, known, base, peaks, plant, law, found, z)
-            while above < 0.0 and width < 1e12:
-                low, below = high, above
-                high += width
-                width *= 4.0
-                above = _residual_at(acceleration, demand, t, c, v, i, high, known, base, peaks, plant, law, found, z)
-            if not (below <= 0.0 <= above):
+            if not _row_solved(acceleration, demand, t, c, v, i, precision, known, base, peaks, plant, law, found, z):
                 return False
-            for _ in range(_MOST_HALVINGS):
-                middle = 0.5 * (low + high)
-                if middle <= low or middle >= high:
-                    break
-                at = _residual_at(acceleration, demand, t, c, v, i, middle, known, base, peaks, plant, law, found, z)
-                if at < 0.0:
-                    low = middle
-                else:
-                    high = middle
-            v[i] = high
-            largest = max(largest, abs(high - before) / (1.0 + abs(high)))
-        if largest <= _CLOSE:
+            largest = max(largest, abs(v[i] - before) / (1.0 + abs(v[i])))
+        for i in range(len(v)):
+            found[START, i] = v[i]
+        if (
+            _with_new_derivatives(acceleration, demand, t, c, v, known, base, peaks, plant, law, found, z, matrix, 0)
+            > 0
+        ):
+            return True
+        for i in range(len(v)):
+            v[i] = found[START, i]
+        precision = max(_CLOSE, _ROUGH * precision)
+        if largest <= 10.0 * _CLOSE:
             respond(acceleration, demand, t, c, v, known, base, peaks, plant, law, found, z)
             return True
     return False
+
+
+@called
+def _row_solved(
+    acceleration: Any,
+    demand: Any,
+    t: float,
+    c: float,
+    v: Floats,
+    i: int,
+    precision: float,
+    known: Floats,
+    base: Floats,
+    peaks: Floats,
+    plant: Floats,
+    law: Floats,
+    found: Floats,
+    z: Floats,
+) -> bool:
+    """Solve row i for its own rate, to a precision relative to 1 + |rate|; return whether its residual changes sign."""
+    low = high = v[i]
+    width = 1e-6 * (1.0 + abs(v[i]))
+    below = above = _residual_at(acceleration, demand, t, c, v, i, low, known, base, peaks, plant, law, found, z)
+    while below > 0.0 and width < _WIDEST:
+        high, above = low, below
+        low -= width
+        width *= 4.0
+        below = _residual_at(acceleration, demand, t, c, v, i, low, known, base, peaks, plant, law, found, z)
+    while above < 0.0 and width < _WIDEST:
+        low, below = high, above
+        high += width
+        width *= 4.0
+        above = _residual_at(acceleration, demand, t, c, v, i, high, known, base, peaks, plant, law, found, z)
+    if not below <= 0.0 <= above:
+        return False
+    for _ in range(_MOST_HALVINGS):
+        middle = 0.5 * (low + high)
+        if middle <= low or middle >= high or high - low <= precision * (1.0 + abs(high)):
+            break
+        if _residual_at(acceleration, demand, t, c, v, i, middle, known, base, peaks, plant, law, found, z) < 0.0:
+            low = middle
+        else:
+            high = middle
+    v[i] = high
+    return True

@@ -9,7 +9,7 @@ import numpy as np
 from numba import types
 
 from fracctl.arrays import Array, Floats
-from fracctl.compiling import ACCELERATION, DEMAND, called, helper, pointer_with
+from fracctl.compiling import ACCELERATION, DEMAND, helper, pointer_with, within
 from fracctl.solvers.implicit_memory_equations import (
     CONTROL,
     D_KNOWN,
@@ -27,7 +27,6 @@ from fracctl.solvers.implicit_memory_equations import (
     Q,
     bracketed,
     newton,
-    respond,
 )
 
 NEWTON, BRACKETED, UNRESOLVED = 0, 1, 2
@@ -45,7 +44,7 @@ _MARCH = types.i8(
 )
 
 
-@called
+@within
 def _filters(rates: Floats, h: float, decay: Floats, early: Floats, late: Floats) -> None:
     """Fill what a mode keeps over a step, and what it takes of a rate at its start and end that is linear between."""
     for j in range(len(rates)):
@@ -76,7 +75,7 @@ def _lead(modes: Floats, decay: Floats, early: Floats, late: Floats, first: floa
         modes[j] = decay[j] * modes[j] + early[j] * first + late[j] * last
 
 
-@called
+@within
 def _known_of_the_end(
     n: int,
     ratio: float,
@@ -101,14 +100,14 @@ def _known_of_the_end(
         known[D_KNOWN, i] = past + known[D_SHARE, i] * (1.0 - orders[i]) * (states[n, m + i] - reference_rate[n, i])
 
 
-@called
+@within
 def _before(ratio: float) -> tuple[float, float]:
     """Return what the last two values add to one, and take from it, in a step `ratio` times as long as the last."""
     lead = (1.0 + 2.0 * ratio) / (1.0 + ratio)
     return (1.0 + ratio) / lead, ratio * ratio / (1.0 + ratio) / lead
 
 
-@called
+@within
 def _limited(found: Floats, known: Floats) -> int:
     """Return which controls are at which limit, as one number."""
     total = 0
@@ -117,7 +116,7 @@ def _limited(found: Floats, known: Floats) -> int:
     return total
 
 
-@called
+@within
 def _taken(
     n: int,
     v: Floats,
@@ -198,18 +197,19 @@ def march(
     known, found = np.empty((8, m)), np.zeros((10, m))
     known[LOWER], known[UPPER] = limits[0], limits[1]
     z, base, peaks = np.empty(auxiliary.shape[1]), np.empty(auxiliary.shape[1]), np.abs(auxiliary[0])
-    v, matrix = np.empty(m), np.full((m, 2 * m), np.nan)
+    v, matrix, rate = np.empty(m), np.full((m, 2 * m), np.nan), np.ones(1)
     decay, early, late = np.empty(len(rates)), np.empty(len(rates)), np.empty(len(rates))
     h, limited = 0.0, -1
     for n in range(len(times) - 1):
         ratio, h = (times[n + 1] - times[n]) / h if n else 0.0, times[n + 1] - times[n]
         if abs(ratio - 1.0) > 1e-12:
+            rate[0] = 1.0
             _filters(rates, h, decay, early, late)
             for i in range(m):
                 known[D_SHARE, i] = h ** (1.0 - orders[i]) / math.gamma(3.0 - orders[i])
         at_limits = _limited(found, known)
         if at_limits != limited:
-            ratio = 0.0
+            ratio, rate[0] = 0.0, 1.0
         limited = at_limits
         _known_of_the_end(n, ratio, states, reference, reference_rate, orders, weights, decay, modes, known)
         one, two = _before(ratio)
@@ -224,13 +224,12 @@ def march(
                 v[i] += h * (slope + (times[n + 1] - times[n - 1]) * bend)
         found[START] = v
         t, c = times[n + 1], h * (1.0 + ratio) / (1.0 + 2.0 * ratio)
-        count = newton(acceleration, demand, t, c, v, known, base, peaks, plant, law, found, z, matrix)
+        count = newton(acceleration, demand, t, c, v, known, base, peaks, plant, law, found, z, matrix, rate)
         how[n], iterations[n] = NEWTON, abs(count)
         if count < 0:
             v[:] = states[n, m:]
-            solved = bracketed(acceleration, demand, t, c, v, known, base, peaks, plant, law, found, z)
+            solved = bracketed(acceleration, demand, t, c, v, known, base, peaks, plant, law, found, z, matrix)
             how[n] = BRACKETED if solved else UNRESOLVED
-        respond(acceleration, demand, t, c, v, known, base, peaks, plant, law, found, z)
         if not _taken(
             n, v, found, z, reference_rate, decay, early, late, modes, states, memory, demands, auxiliary, peaks
         ):
