@@ -14,10 +14,10 @@ demo: $(VENV)/installed
 	$(BIN)/fracctl run experiment=ic1_outofplane
 
 test: lint
-	$(BIN)/pytest -m "not slow"
+	$(BIN)/pytest --numprocesses=auto --maxprocesses=4 -m "not slow"
 
 test-slow: $(VENV)/installed-test
-	$(BIN)/pytest -m slow
+	$(BIN)/pytest --numprocesses=auto --maxprocesses=4 -m slow
 
 lint: $(VENV)/installed-test
 	$(BIN)/ruff check
