@@ -226,7 +226,8 @@ class MemoryEvaluation(Evaluation):
         rows = joined(list(parts))
         measured = [column for measure in self.measures for column in measure.columns]
         varied = [name for name in self.design_variables if name != NUMBER and np.unique(rows[name]).size > 1]
-        notes = [*self._endings(rows), f"memory: relative error of its kernel at most {self._solver.memory_tolerance:g}"]
+        exact = f"memory: relative error of its kernel at most {self._solver.memory_tolerance:g}, a-priori"
+        notes = [*self._endings(rows), exact]
         if self.dispersed:
             groups = ["initial_condition", *([LAW] if self.laws else []), *varied]
             records = list(spreads(rows, groups, measured))
