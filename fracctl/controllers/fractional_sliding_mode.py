@@ -70,7 +70,8 @@ class FractionalSlidingMode:
                 if not parameter.contains(float(value)):
                     raise ArgumentError(parameter.name, float(value), parameter.allowed)
         self._reference = reference or Approach()
-        self.batch = batch_size(**{name: (value, 0) for name, value in self._values.items()})
+        wanted, _ = self._reference(np.zeros(1))
+        self.batch = batch_size(**{name: (value, 0) for name, value in self._values.items()}, reference=(wanted, 2))
 
     @staticmethod
     def parameters(components: Sequence[str]) -> tuple[Parameter, ...]:

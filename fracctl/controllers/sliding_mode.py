@@ -94,7 +94,9 @@ class AdaptiveSlidingMode:
         if self.gamma.ndim not in (1, 2) or (self.gamma < 0.0).any():
             raise ArgumentError("gamma", self.gamma.tolist(), "must hold numbers from 0 on, (m,) or (b, m)")
         self._reference = reference or Approach(components=self.gamma.shape[-1])
-        self.batch = batch_size(**{name: (value, 0) for name, value in self._values.items()}, gamma=(self.gamma, 1))
+        wanted, _ = self._reference(np.zeros(1))
+        sizes = {name: (value, 0) for name, value in self._values.items()}
+        self.batch = batch_size(**sizes, gamma=(self.gamma, 1), reference=(wanted, 2))
 
     @staticmethod
     def parameters(components: Sequence[str]) -> tuple[Parameter, ...]:

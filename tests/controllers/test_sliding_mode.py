@@ -199,6 +199,14 @@ def test_the_reconstruction_is_a_law_for_tethers() -> None:
         FractionalSlidingMode().numbers(FunctionPlant(lambda t, x, u: x, 6, 3), 1)
 
 
+def test_references_of_many_make_a_batch() -> None:
+    for kind in (AdaptiveSlidingMode, FractionalSlidingMode):
+        assert kind(reference=Approach(0.1, 1.0, [0.5, 0.7])).batch == 2
+        assert kind(reference=Approach(0.1)).batch is None
+        with pytest.raises(ArgumentError, match="must have the same batch size"):
+            kind(nu=[0.5] * 3, reference=Approach(0.1, 1.0, [0.5, 0.7]))
+
+
 def test_approaches_are_exponentials_and_steps() -> None:
     times, step = np.linspace(0.0, 5.0, 7), 1e-6
     approach = Approach(0.1, [1.0, 0.8], [0.5, 0.0], components=2)
