@@ -13,8 +13,9 @@ from fracctl.meshwise import MeshTrajectory
 class LengthOvershoot:
     """The largest excursion of the length past its target, in percent of the way there; 0 if there is none.
 
-    The target is the reference at the horizon. For station-keeping, which starts at the target, the largest excursion
-    to either side in percent of the target. Found on the cubics between the times of the mesh, up to a member's end.
+    The target is what the reference goes to in the end. For station-keeping, which starts at the target, the largest
+    excursion to either side in percent of the target. Found on the cubics between the times of the mesh, up to a
+    member's end.
     """
 
     name = "length_overshoot"

@@ -16,10 +16,11 @@ from fracctl.meshwise import MeshTrajectory
 class LengthSettling:
     """When the length of a tether enters bands about its target for good.
 
-    A band of p percent is |λ - λ_d| ≤ p/100 · span, where λ_d is the reference at the horizon and the span the way
-    |λ_d - λ(0)| there; for station-keeping, which starts at the target, the target itself. The last crossing on the
-    cubics between the times of the mesh, as f/2π (``orbits``) and as time over the orbital period, t/T (``periods``),
-    which differ on an ellipse. +inf where the length is outside at the horizon, or the member ended before.
+    A band of p percent is |λ - λ_d| ≤ p/100 · span, where λ_d is what the reference goes to in the end and the span
+    the way |λ_d - λ(0)| there; for station-keeping, which starts at the target, the target itself. The last crossing
+    on the cubics between the times of the mesh, as f/2π (``orbits``) and as time over the orbital period, t/T
+    (``periods``), which differ on an ellipse. +inf where the length is outside at the horizon, or the member ended
+    before.
 
     Args:
         bands: in percent of the span, one or more.
