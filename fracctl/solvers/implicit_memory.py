@@ -40,7 +40,9 @@ class ImplicitMemory:
     Newton's method with differences, whose derivatives are kept as long as they serve, and where that does not converge
     (a control that jumps to the other limit) by bracketing one row after the other, each of which grows with its own
     rate. The derivative D^ν is that of rates linear in each step: exact in the step itself, by decaying modes before.
-    Error O(step²), away from kinks of the limits.
+    Error O(step²), away from kinks of the limits. Where no limit holds a derivative of Riemann and Liouville of order ν
+    back, rates err by O(first_step^(1-ν)) too, which for orders above 0.6 asks for a much shorter first step (1e-28 for
+    0.8) and is more than the error estimate tells.
 
     A pilot run tells where the motion is smooth, for steps of up to 10 times `step`, and where it bends or a control
     comes to a limit, for an eighth of it. The run is then made twice, on that mesh and with each of its steps halved;

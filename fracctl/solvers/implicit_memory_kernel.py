@@ -18,6 +18,7 @@ from fracctl.solvers.implicit_memory_equations import (
     LOWER,
     Q_KNOWN,
     Q_WANTED,
+    RESIDUAL,
     START,
     UPPER,
     V_KNOWN,
@@ -133,12 +134,12 @@ def _taken(
     auxiliary: Floats,
     peaks: Floats,
 ) -> bool:
-    """Store the end of step n and lead the modes there; return whether all states are numbers."""
+    """Store the end of step n and lead the modes there; return whether states and residuals are numbers."""
     m, finite = len(v), True
     for i in range(m):
         states[n + 1, i], states[n + 1, m + i] = found[Q, i], v[i]
         memory[n + 1, i], demands[n + 1, i] = found[D, i], found[WANTED, i]
-        finite = finite and math.isfinite(found[Q, i]) and math.isfinite(v[i])
+        finite = finite and math.isfinite(found[Q, i]) and math.isfinite(v[i]) and math.isfinite(found[RESIDUAL, i])
         before = states[n, m + i] - reference_rate[n, i]
         _lead(modes[i], decay, early, late, before, found[ERROR_RATE, i])
     for k in range(len(z)):
@@ -191,7 +192,7 @@ def march(
         iterations: to be filled with Newton's iterations, (S,).
 
     Returns:
-        The number of steps taken before a state was no number.
+        The number of steps taken before a state or an acceleration was no number.
     """
     m = len(orders)
     known, found = np.empty((8, m)), np.zeros((10, m))
