@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 LAW, NUMBER = "law", "law_number"
 LAWS, QUANTILES = "laws", "quantiles"
 """Names of the tables."""
-AT_ONCE = 32
-"""Runs that are solved together; each holds some 3 MB."""
 MOST_BESIDE = 8
 """Points from each start that are shown beside each other."""
 SAMPLES_IN_PERIOD = 1000
@@ -141,7 +139,7 @@ class MemoryEvaluation(Evaluation):
         parts = []
         for name in names:
             states = self._starts(self.initial_conditions[name], drawn, b)
-            measured = self._grouped(table, drawn, states)
+            measured = self._solved(table, drawn, states)
             parts.append({"initial_condition": np.full(b, name, dtype=object), **table, SAMPLE: samples} | measured)
         rows = joined([part | drawn for part in parts])
         if self.laws:
@@ -156,20 +154,13 @@ class MemoryEvaluation(Evaluation):
                 states[:, place] = values
         return states
 
-    def _grouped(self, table: Mapping[str, Floats], drawn: Mapping[str, Floats], states: Floats) -> dict[str, Array]:
-        """Return the measures of b points, law by law and some at a time, in their order."""
-        order = np.argsort(table[NUMBER], kind="stable") if self.laws else np.arange(len(states))
-        numbers = table[NUMBER][order] if self.laws else np.zeros(len(states))
-        ends = [*(1 + np.flatnonzero(np.diff(numbers))).tolist(), len(order)]
-        parts, first = [], 0
-        for end in ends:
-            for start in range(first, end, AT_ONCE):
-                places = order[start : min(start + AT_ONCE, end)]
-                loop = self._loop(_taken(table, places), self._plant(_taken(drawn, places)))
-                parts.append(self._measured(self._solver.solve(loop, states[places], self.horizon)))
-            first = end
-        back = np.argsort(order, kind="stable")
-        return {name: values[back] for name, values in joined(parts).items()}
+    def _solved(self, table: Mapping[str, Floats], drawn: Mapping[str, Floats], states: Floats) -> dict[str, Array]:
+        """Return the measures of b points, each on a mesh of its own: a row depends on its point alone."""
+        parts = []
+        for place in np.arange(len(states))[:, None]:
+            loop = self._loop(_taken(table, place), self._plant(_taken(drawn, place)))
+            parts.append(self._measured(self._solver.solve(loop, states[place], self.horizon)))
+        return joined(parts)
 
     def _plant(self, drawn: Mapping[str, Floats]) -> Any:
         own = {name: values for name, values in drawn.items() if not name.startswith(_INITIAL)}
