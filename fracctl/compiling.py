@@ -56,13 +56,13 @@ def compiled_with(**options: Any) -> Callable[[_Function], _Function]:
     return decorate
 
 
-def pointer_with(signature: Any) -> Callable[[_Function], _Function]:
+def pointer_with(signature: Any, **options: Any) -> Callable[[_Function], _Function]:
     """Return a decorator that compiles a function for one signature, at the import of its module.
 
     Such functions can be handed over to kernels that take a `numba.types.FunctionType` of the signature. Their
     arithmetic is not reordered: called directly or handed over they give the same bits.
     """
-    options: dict[str, Any] = {"error_model": "numpy"} | _ALIKE
+    options |= {"error_model": "numpy"} | _ALIKE
 
     def decorate(function: _Function) -> _Function:
         kernel: _Function
@@ -90,10 +90,12 @@ def helper_with(**options: Any) -> Callable[[_Function], _Function]:
     return decorate
 
 
-called = helper_with(error_model="numpy", forceinline=False)
+BARE: dict[str, Any] = {"_nrt": False}
+"""For functions that make no arrays: who refers to which need not be counted, which can cost a kernel half its time."""
+called = helper_with(error_model="numpy", forceinline=False, **BARE)
 """The decorator of functions that only kernels call and that are not copied into them: too long, or called at many
 places. Their arithmetic is not reordered, so that all compiled copies give the same bits."""
-within = helper_with(error_model="numpy")
+within = helper_with(error_model="numpy", **BARE)
 """The same for functions that are copied into the one kernel that calls them."""
 _ARITHMETIC: dict[str, Any] = {"error_model": "numpy", "fastmath": {"reassoc", "contract", "nsz", "arcp"}}
 """Arithmetic that may be reordered and divides by zero as NumPy does."""

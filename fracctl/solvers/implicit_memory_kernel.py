@@ -9,7 +9,7 @@ import numpy as np
 from numba import types
 
 from fracctl.arrays import Array, Floats
-from fracctl.compiling import ACCELERATION, DEMAND, helper, pointer_with, within
+from fracctl.compiling import ACCELERATION, BARE, DEMAND, helper, pointer_with, within
 from fracctl.solvers.implicit_memory_equations import (
     CONTROL,
     D_KNOWN,
@@ -42,6 +42,7 @@ _MARCH = types.i8(
     *[_ROWS] * 7,
     types.i1[::1],
     types.i4[::1],
+    types.Tuple((_ROWS, _ROWS, *[_ROW] * 5, _ROWS, *[_ROW] * 3)),  # type: ignore[no-untyped-call]
 )
 
 
@@ -102,6 +103,35 @@ def _known_of_the_end(
 
 
 @within
+def _shares(h: float, orders: Floats, known: Floats) -> None:
+    """Fill what the rate at the end of a step has of D, and its start 1 - ν times that."""
+    for i in range(len(orders)):
+        known[D_SHARE, i] = h ** (1.0 - orders[i]) / math.gamma(3.0 - orders[i])
+
+
+@within
+def _known_of_auxiliary(n: int, ratio: float, auxiliary: Floats, base: Floats) -> None:
+    """Fill what the auxiliary states at the end of step n are without their rates there."""
+    one, two = _before(ratio)
+    for k in range(len(base)):
+        base[k] = one * auxiliary[n, k] - two * auxiliary[max(n - 1, 0), k]
+
+
+@within
+def _predict(n: int, h: float, times: Floats, states: Floats, v: Floats, found: Floats) -> None:
+    """Continue the rates of the last three times, or keep the last ones; in `v` and `found`."""
+    m = len(v)
+    for i in range(m):
+        v[i] = states[n, m + i]
+        if n > 2:
+            slope = (v[i] - states[n - 1, m + i]) / (times[n] - times[n - 1])
+            earlier = (states[n - 1, m + i] - states[n - 2, m + i]) / (times[n - 1] - times[n - 2])
+            bend = (slope - earlier) / (times[n] - times[n - 2])
+            v[i] += h * (slope + (times[n + 1] - times[n - 1]) * bend)
+        found[START, i] = v[i]
+
+
+@within
 def _before(ratio: float) -> tuple[float, float]:
     """Return what the last two values add to one, and take from it, in a step `ratio` times as long as the last."""
     lead = (1.0 + 2.0 * ratio) / (1.0 + ratio)
@@ -148,7 +178,13 @@ def _taken(
     return finite
 
 
-@pointer_with(_MARCH)
+def room_for(m: int, p: int, modes: int) -> tuple[Floats, ...]:
+    """Return the arrays that `march` works in: without any of its own it need not count who refers to them."""
+    vectors, filters = (np.zeros(p) for _ in range(3)), (np.zeros(modes) for _ in range(3))
+    return np.zeros((8, m)), np.zeros((10, m)), *vectors, np.zeros(m), np.zeros(1), np.zeros((m, 2 * m)), *filters
+
+
+@pointer_with(_MARCH, **BARE)
 def march(
     acceleration: Any,
     demand: Any,
@@ -168,6 +204,7 @@ def march(
     auxiliary: Floats,
     how: Array,
     iterations: Array,
+    room: tuple[Floats, ...],
 ) -> int:
     """Make all steps of one member.
 
@@ -190,45 +227,38 @@ def march(
         auxiliary: to be filled, (S + 1, p); holds z(0).
         how: to be filled with how the equations of each step were solved, (S,).
         iterations: to be filled with Newton's iterations, (S,).
+        room: arrays to work in, see `room_for`.
 
     Returns:
         The number of steps taken before a state or an acceleration was no number.
     """
     m = len(orders)
-    known, found = np.empty((8, m)), np.zeros((10, m))
-    known[LOWER], known[UPPER] = limits[0], limits[1]
-    z, base, peaks = np.empty(auxiliary.shape[1]), np.empty(auxiliary.shape[1]), np.abs(auxiliary[0])
-    v, matrix, rate = np.empty(m), np.full((m, 2 * m), np.nan), np.ones(1)
-    decay, early, late = np.empty(len(rates)), np.empty(len(rates)), np.empty(len(rates))
+    known, found, z, base, peaks, v, rate, matrix, decay, early, late = room
+    rate[0], matrix[0, m] = 1.0, math.nan
+    for i in range(m):
+        known[LOWER, i], known[UPPER, i] = limits[0, i], limits[1, i]
+    for k in range(len(z)):
+        peaks[k] = abs(auxiliary[0, k])
     h, limited = 0.0, -1
     for n in range(len(times) - 1):
         ratio, h = (times[n + 1] - times[n]) / h if n else 0.0, times[n + 1] - times[n]
         if abs(ratio - 1.0) > 1e-12:
             rate[0] = 1.0
             _filters(rates, h, decay, early, late)
-            for i in range(m):
-                known[D_SHARE, i] = h ** (1.0 - orders[i]) / math.gamma(3.0 - orders[i])
+            _shares(h, orders, known)
         at_limits = _limited(found, known)
         if at_limits != limited:
             ratio, rate[0] = 0.0, 1.0
         limited = at_limits
         _known_of_the_end(n, ratio, states, reference, reference_rate, orders, weights, decay, modes, known)
-        one, two = _before(ratio)
-        for k in range(len(z)):
-            base[k] = one * auxiliary[n, k] - two * auxiliary[max(n - 1, 0), k]
-        for i in range(m):
-            v[i] = states[n, m + i]
-            if n > 2:
-                slope = (v[i] - states[n - 1, m + i]) / (times[n] - times[n - 1])
-                earlier = (states[n - 1, m + i] - states[n - 2, m + i]) / (times[n - 1] - times[n - 2])
-                bend = (slope - earlier) / (times[n] - times[n - 2])
-                v[i] += h * (slope + (times[n + 1] - times[n - 1]) * bend)
-        found[START] = v
+        _known_of_auxiliary(n, ratio, auxiliary, base)
+        _predict(n, h, times, states, v, found)
         t, c = times[n + 1], h * (1.0 + ratio) / (1.0 + 2.0 * ratio)
         count = newton(acceleration, demand, t, c, v, known, base, peaks, plant, law, found, z, matrix, rate)
         how[n], iterations[n] = NEWTON, abs(count)
         if count < 0:
-            v[:] = states[n, m:]
+            for i in range(m):
+                v[i] = states[n, m + i]
             solved = bracketed(acceleration, demand, t, c, v, known, base, peaks, plant, law, found, z, matrix)
             how[n] = BRACKETED if solved else UNRESOLVED
         if not _taken(
