@@ -70,6 +70,7 @@ class Optima:
         self._baseline = dict(baseline or {})
         self._initial_conditions: list[str] = []
         self._best: dict[_Place, tuple[Rank, dict[str, Any]]] = {}
+        self._only: dict[_Place, dict[str, Any] | None] = {}
 
     def add(self, rows: Rows) -> None:
         """Take further rows into account."""
@@ -96,39 +97,44 @@ class Optima:
         ]
 
     def _of(self, objective: str, name: str, kind: str) -> Iterator[tuple[tuple[float, ...], dict[str, Any]]]:
-        found = [(key[3], row) for key, (_, row) in self._best.items() if key[:3] == (objective, name, kind)]
+        single = {place: row for place, row in self._only.items() if row is not None}
+        places = single | {place: row for place, (_, row) in self._best.items()}
+        found = [(place[3], row) for place, row in places.items() if place[:3] == (objective, name, kind)]
         yield from sorted(found, key=lambda item: item[0])
 
     def _add(self, rows: Rows, objective: str, name: str, present: Booleans, allowed: Booleans) -> None:
         self._offer(rows, allowed, (objective, name, "overall", ()))
         if self._baseline:
             matching = np.logical_and.reduce([rows[column] == value for column, value in self._baseline.items()])
-            self._offer(rows, allowed & matching, (objective, name, "baseline", ()))
-            here = present & matching & (rows["status"] != "failed")
-            if self._any_single and np.count_nonzero(here) == 1 and not np.any(allowed & here):
-                self._offer(rows, here, (objective, name, "baseline", ()))
+            self._offer_also_single(rows, present & matching, allowed, (objective, name, "baseline", ()))
         if self._slices:
             table = np.stack([rows[column] for column in self._slices], axis=-1)
             for values in np.unique(table[present], axis=0):
-                inside = (table == values).all(axis=1)
-                here = present & inside & (rows["status"] != "failed")
-                alone = self._any_single and np.count_nonzero(here) == 1
-                self._offer(
-                    rows, here if alone else allowed & inside, (objective, name, "slice", tuple(values.tolist()))
-                )
+                inside = present & (table == values).all(axis=1)
+                self._offer_also_single(rows, inside, allowed, (objective, name, "slice", tuple(values.tolist())))
+
+    def _offer_also_single(self, rows: Rows, inside: Booleans, allowed: Booleans, place: _Place) -> None:
+        self._offer(rows, allowed & inside, place)
+        (where,) = np.nonzero(inside & (rows["status"] != "failed"))
+        if self._any_single and where.size:
+            alone = where.size == 1 and place not in self._only
+            self._only[place] = _row(rows, where[0]) if alone else None
 
     def _offer(self, rows: Rows, allowed: Booleans, place: _Place) -> None:
         (where,) = np.nonzero(allowed)
         if not where.size:
             return
-        values = np.where(np.isnan(values := rows[f"objective_{place[0]}"][where]), np.inf, values)
+        values = rows[f"objective_{place[0]}"][where]
         lowest = where[values == values.min()]
         tied = {column: array[lowest] for column, array in rows.items()}
         found = ranks(tied, place[0], self._objectives[place[0]], self._design_variables)
         rank = min(found)
         if place not in self._best or rank < self._best[place][0]:
-            best = found.index(rank)
-            self._best[place] = (rank, {column: _scalar(array[best]) for column, array in tied.items()})
+            self._best[place] = (rank, _row(tied, found.index(rank)))
+
+
+def _row(rows: Rows, place: int) -> dict[str, Any]:
+    return {column: _scalar(array[place]) for column, array in rows.items()}
 
 
 def _scalar(value: Any) -> Any:

@@ -48,8 +48,17 @@ OF_EXPERIMENTS = {
         *("survey=weights_delayed", "measures=formation_perturbed", "plant=perturbed_relative_motion"),
         *(f"initial_condition={name}" for name in catalogue().options("initial_condition") if "formation" in name),
     ],
+    "tether": [
+        *("controller=fda_smc", "controller=da_smc", "controller=fo_smc_reconstruction", "solver=implicit_memory"),
+        *("evaluation=memory", "evaluation=tether_laws", "measures=tether", "objectives=deployment"),
+        *("initial_condition=release", "initial_condition=release_fast", "initial_condition=release_slow"),
+        *("initial_condition=deployed", "initial_condition=deployed_swinging"),
+    ],
+    "tether_eccentric": ["plant=tether_eccentric", "evaluation=tether_laws_eccentric"],
+    "tether_orders": ["survey=tether_orders"],
+    "tether_retrieval": ["survey=tether_approaches"],
 }
-"""Options under delayed feedback, by an experiment that has all else they need."""
+"""Options under delayed feedback, or with a memory in the loop, by an experiment that has all else they need."""
 
 COMPANIONS = {
     "plant=hcw": ["controller=pd_alpha_full"],
@@ -58,6 +67,7 @@ COMPANIONS = {
     "controller=pd_in_plane": ["plant=hcw_in_plane"],
     "controller=pd_alpha_in_plane": ["plant=hcw_in_plane"],
     "plant=tether": ["experiment=libration", "initial_condition=own", "initial_condition.own.length=1"],
+    "initial_condition=release_eccentric": ["experiment=tether_eccentric"],
     "controller=pd_alpha_full": ["plant=hcw"],
     "controller=pd_alpha_relative": ["experiment=nonlinear_ic1"],
     "initial_condition=ic1_relative": ["experiment=nonlinear_ic1"],
@@ -131,6 +141,17 @@ TINY_DELAYED = {
     "libration_window": ["survey.axes.gain_1_2=[0.2,0.3]", "survey.axes.recall=[0.0,0.3]"],
     "formation_weights": ["survey.axes.beta=[100.0,1000.0]"],
 }
+TETHERS = {
+    "tether": ([], 3),
+    "tether_causes": ([], 6),
+    "tether_eccentric": ([], 3),
+    "tether_monte_carlo": (["evaluation.samples=3"], 9),
+    "tether_orders": (["survey.axes.alpha_1=[0.0,0.5]", "survey.axes.nu=[0.4,0.5]"], 4),
+    "tether_release": ([], 3),
+    "tether_retrieval": (["survey.axes.reference_rate=[0.0,0.7]"], 2),
+    "tether_station_keeping": ([], 3),
+}
+"""Experiments with a memory in the loop: what makes them tiny, and their rows for each start."""
 FIXED = {"inplane_decoupled": 1, "inplane_lqr": 1, "inplane_published": 2, "nonlinear_ic1": 1}
 """Experiments of so few design points that they need no budget, with their number."""
 
@@ -196,7 +217,19 @@ def test_an_experiment_under_delayed_feedback_runs_on_a_tiny_budget(name: str, t
     assert {path.stem for path in (result.run_directory / "figures").glob("*.pdf")} == set(config.figures)
 
 
-OTHERS = {*CONTINUATIONS, *SEARCHES, *COMPARISONS, *DELAYED}
+@pytest.mark.parametrize("name", TETHERS)
+def test_an_experiment_with_a_memory_runs_on_a_tiny_budget(name: str, tmp_path: Path) -> None:
+    budget, rows = TETHERS[name]
+    fixed = ["horizon_periods=1", "solver.step=0.02", "scheduler=serial", f"output_dir={tmp_path}"]
+    config = compose([f"experiment={name}", *budget, *fixed])
+    result = execute(config)
+    assert result.summary["status"] == "finished"
+    assert len(result.evaluations) == rows * len(config.initial_condition)
+    assert np.isfinite(result.evaluations["error_estimate"]).all()
+    assert {path.stem for path in (result.run_directory / "figures").glob("*.pdf")} == set(config.figures)
+
+
+OTHERS = {*CONTINUATIONS, *SEARCHES, *COMPARISONS, *DELAYED, *TETHERS}
 
 
 @pytest.mark.parametrize("name", sorted({*EXPERIMENTS} - OTHERS))

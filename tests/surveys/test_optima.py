@@ -138,3 +138,36 @@ def test_values_are_plain() -> None:
     best = overall(rows({"k": 1.0}))
     assert best is not None
     assert type(best["k"]) is float
+
+
+FAILING: dict[str, Any] = {"settling_time": np.nan, "status": "collision"}
+
+
+def test_a_law_that_fails_is_still_the_one_of_its_slice() -> None:
+    table = rows({"a": 0.8}, {"a": 0.9} | FAILING, {"a": 1.0, "stable": False})
+    kept = optima(table, slices=("a",), any_single=True)
+    found = [(r["kind"], r["a"], r["status"]) for r in kept if r["objective_name"] == "time"]
+    slices = [("slice", 0.8, "ok"), ("slice", 0.9, "collision"), ("slice", 1.0, "ok")]
+    assert found == [("overall", 0.8, "ok"), *slices], "never the best of all"
+    assert [r["a"] for r in optima(table, slices=("a",)) if r["kind"] == "slice"] == [0.8, 0.8]
+
+
+def test_a_single_point_that_failed_to_compute_is_no_slice() -> None:
+    assert optima(rows({"status": "failed"}), slices=("a",), baseline={"a": 1.0}, any_single=True) == []
+
+
+def test_a_single_baseline_counts_whatever_it_is() -> None:
+    table = rows({"a": 0.9}, {"a": 1.0} | FAILING)
+    (joint, time) = (r for r in optima(table, baseline={"a": 1.0}, any_single=True) if r["kind"] == "baseline")
+    assert joint["status"] == time["status"] == "collision"
+
+
+@pytest.mark.parametrize("kinds", [{"slices": ("a",)}, {"baseline": {"a": 1.0}}])
+def test_of_several_points_one_must_be_a_candidate(kinds: dict[str, Any]) -> None:
+    """Also where they come in different parts."""
+    bad, worse, good = ({"k": k} | (FAILING if k < 3.0 else {}) for k in (1.0, 2.0, 3.0))
+    assert optima(rows(bad, worse), any_single=True, **kinds) == []
+    assert optima(rows(bad), rows(worse), any_single=True, **kinds) == []
+    for parts in ([rows(bad, worse, good)], [rows(bad), rows(worse), rows(good)], [rows(good), rows(bad, worse)]):
+        found = [r["k"] for r in optima(*parts, any_single=True, **kinds) if r["kind"] in ("slice", "baseline")]
+        assert found == [3.0, 3.0], "one for each objective"
