@@ -204,12 +204,14 @@ class MemoryEvaluation(Evaluation):
 
     @property
     def sampled_columns(self) -> tuple[str, ...]:
-        """Columns of stored trajectories: states, controls, and what the law would have liked to give."""
-        return (*super().sampled_columns, *(f"demand_{component}" for component in self.plant.components))
+        """Columns of stored trajectories: states, controls, what the law would have liked to give, and q_d."""
+        further = (f"{what}_{component}" for what in ("demand", "reference") for component in self.plant.components)
+        return (*super().sampled_columns, *further)
 
     def sampled(self, trajectory: Any, times: Floats) -> dict[str, Floats]:
         """Return the `sampled_columns` of a single trajectory at times (t,), (t,) each."""
-        samples = np.column_stack([trajectory(times), trajectory.control(times), trajectory.demand(times)])
+        wanted = trajectory.law.reference(times)[0].reshape(-1, len(times), len(self.plant.components))[0]
+        samples = np.column_stack([trajectory(times), trajectory.control(times), trajectory.demand(times), wanted])
         return dict(zip(self.sampled_columns, samples.T, strict=True))
 
     def conclude(self, parts: Iterable[Mapping[str, Array]]) -> Conclusion:

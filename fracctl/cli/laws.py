@@ -31,7 +31,7 @@ def quantile_lines(records: Sequence[Record]) -> list[str]:
     for group in groups:
         own = [record for record in records if _group(record) == group and record["smallest"] != record["largest"]]
         title = ", ".join(text if name in ("initial_condition", "law") else f"{name} = {text}" for name, text in group)
-        head = [title, "5 %", "median", "95 %", "its interval", "smallest", "sample", "largest", "sample"]
+        head = [title, "5 %", "median", "95 %", "interval of 95 %", "smallest", "sample", "largest", "sample"]
         lines += table([head, *(list(_cells(record)) for record in own)])
     return lines
 

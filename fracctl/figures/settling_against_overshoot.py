@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
@@ -18,7 +20,8 @@ SETTLING, OVERSHOOT, MARGIN = "settling_2_percent_orbits", "overshoot_percent", 
 def build(results: Results, selection: Selection) -> tuple[Figure, pd.DataFrame]:
     """Draw every point by settling and overshoot, coloured by the tension margin, and settling over the two axes.
 
-    Points that no other one beats in both are joined.
+    Points that no other one beats in both are joined. Negative margins, of demands beyond a bound, share a colour
+    where there are positive ones.
 
     Raises:
         FigureError: a measure is missing, the survey does not vary two parameters, or no point has settled.
@@ -42,12 +45,15 @@ def build(results: Results, selection: Selection) -> tuple[Figure, pd.DataFrame]
 
 
 def _traded(figure: Figure, ax: Axes, rows: pd.DataFrame) -> None:
-    points = ax.scatter(rows[SETTLING], rows[OVERSHOOT], c=rows[MARGIN], cmap=COLOUR_MAP, s=14.0, linewidths=0.0)
+    least = 0.0 if rows[MARGIN].min() < 0.0 < rows[MARGIN].max() else None
+    shade: dict[str, Any] = {"c": rows[MARGIN], "cmap": COLOUR_MAP, "vmin": least}
+    points = ax.scatter(rows[SETTLING], rows[OVERSHOOT], s=14.0, linewidths=0.0, **shade)
     front = front_of(rows)
     ax.plot(front[SETTLING], front[OVERSHOOT], color=ORANGE, linewidth=0.9, marker="o", markersize=2.5)
     ax.set_xlabel("Settling to 2 % (orbits)")
     ax.set_ylabel("Overshoot (%)")
-    figure.colorbar(points, ax=ax, label="Least demanded tension less its bound")
+    extend = "neither" if least is None else "min"
+    figure.colorbar(points, ax=ax, extend=extend, label="Margin of the demanded tension")
 
 
 def front_of(rows: pd.DataFrame) -> pd.DataFrame:

@@ -36,6 +36,9 @@ _UNITS = {
     "_percent": "%",
     "_orbits": "orbits",
     "_periods": "periods",
+    "_rad": "rad",
+    "_min_n": "N",
+    "_max_n": "N",
     "change_percent": "%",
 }
 DIMENSIONLESS = "1"

@@ -145,7 +145,7 @@ TETHERS = {
     "tether": ([], 3),
     "tether_causes": ([], 6),
     "tether_eccentric": ([], 3),
-    "tether_monte_carlo": (["evaluation.samples=3"], 9),
+    "tether_monte_carlo": (["evaluation.samples=3"], 6),
     "tether_orders": (["survey.axes.alpha_1=[0.0,0.5]", "survey.axes.nu=[0.4,0.5]"], 4),
     "tether_release": ([], 3),
     "tether_retrieval": (["survey.axes.reference_rate=[0.0,0.7]"], 2),
