@@ -22,6 +22,8 @@ from fracctl.plants.linear import LinearPlant
 from fracctl.solvers.base import Solver
 from fracctl.trajectory import Trajectory
 
+LAW_NUMBER = "law_number"
+"""Design variable of evaluations of several laws."""
 COUNTERS = ("nodes",)
 BEYOND_LIMITS = "beyond_limits"
 """Status of a point that breaks a constraint."""

@@ -13,13 +13,13 @@ from fracctl.arrays import Array, Floats, joined
 from fracctl.controllers import Saturation
 from fracctl.dispersions import SAMPLE, Distribution, draws, spreads
 from fracctl.errors import ArgumentError, suggestion
-from fracctl.evaluation import COUNTERS, Conclusion, Evaluation, ParametrisedLaw, geometric_mean
+from fracctl.evaluation import COUNTERS, LAW_NUMBER, Conclusion, Evaluation, ParametrisedLaw, geometric_mean
 from fracctl.loop import ClosedLoop
 
 if TYPE_CHECKING:
     from fracctl.meshwise import MeshTrajectory
 
-LAW, NUMBER = "law", "law_number"
+LAW = "law"
 LAWS, QUANTILES = "laws", "quantiles"
 """Names of the tables."""
 MOST_BESIDE = 8
@@ -89,7 +89,7 @@ class MemoryEvaluation(Evaluation):
     @cached_property
     def axes(self) -> Mapping[str, Floats]:
         """The number of the law and that of the sample, where there are several."""
-        axes: dict[str, Floats] = {NUMBER: np.arange(len(self.laws), dtype=np.float64)} if self.laws else {}
+        axes: dict[str, Floats] = {LAW_NUMBER: np.arange(len(self.laws), dtype=np.float64)} if self.laws else {}
         if self.dispersed:
             axes[SAMPLE] = self.first_sample + np.arange(self.samples, dtype=np.float64)
         return axes
@@ -97,12 +97,12 @@ class MemoryEvaluation(Evaluation):
     @property
     def sliced_by(self) -> str | None:
         """The axis for each value of which an optimum is kept, where the survey names none."""
-        return NUMBER if self.laws and not self.dispersed else None
+        return LAW_NUMBER if self.laws and not self.dispersed else None
 
     @cached_property
     def design_variables(self) -> tuple[str, ...]:
         """The parameters of the one law, or the number of the law."""
-        return (NUMBER,) if self.laws else super().design_variables
+        return (LAW_NUMBER,) if self.laws else super().design_variables
 
     @cached_property
     def row_columns(self) -> tuple[str, ...]:
@@ -120,7 +120,7 @@ class MemoryEvaluation(Evaluation):
 
     def _loop(self, design: Mapping[str, Floats | float], plant: Any) -> ClosedLoop:
         if self.laws:
-            number = int(np.ravel(design.get(NUMBER, 0.0))[0])
+            number = int(np.ravel(design.get(LAW_NUMBER, 0.0))[0])
             law, values = list(self.laws.values())[number].law, dict(list(self.laws.values())[number].values)
         else:
             law, values = self.law, {**self.parameters, **design}  # type: ignore[dict-item]
@@ -144,7 +144,7 @@ class MemoryEvaluation(Evaluation):
         rows = joined([part | drawn for part in parts])
         if self.laws:
             known = np.array(list(self.laws), dtype=object)
-            rows[LAW] = known[rows[NUMBER].astype(int)]
+            rows[LAW] = known[rows[LAW_NUMBER].astype(int)]
         return {name: rows[name] for name in self.row_columns}
 
     def _starts(self, nominal: Floats, drawn: Mapping[str, Floats], b: int) -> Floats:
@@ -218,7 +218,7 @@ class MemoryEvaluation(Evaluation):
         """Return quantiles of a dispersed run, a table of the laws or points if there are few; and why runs ended."""
         rows = joined(list(parts))
         measured = [column for measure in self.measures for column in measure.columns]
-        varied = [name for name in self.design_variables if name != NUMBER and np.unique(rows[name]).size > 1]
+        varied = [name for name in self.design_variables if name != LAW_NUMBER and np.unique(rows[name]).size > 1]
         exact = f"memory: relative error of its kernel at most {self._solver.memory_tolerance:g}, a-priori"
         notes = [*self._endings(rows), exact]
         if self.dispersed:

@@ -21,7 +21,7 @@ from fracctl.config.schemas import PerformanceEvaluation as PerformanceOptions
 from fracctl.controllers import Saturation
 from fracctl.dispersions import Distribution
 from fracctl.errors import ArgumentError, ConfigurationError
-from fracctl.evaluation import Evaluation
+from fracctl.evaluation import LAW_NUMBER, Evaluation
 from fracctl.measures.base import TRAJECTORIES, LoopMeasure, trajectories_of
 from fracctl.measures.limits import limit
 from fracctl.plants import LinearPlant
@@ -124,6 +124,9 @@ def build_survey(config: RunConfig, evaluation: Evaluation) -> Survey:
         return Single({name: parameters[name] for name in evaluation.design_variables})
     if isinstance(survey, SingleSurvey | GridSurvey):
         grid = survey if isinstance(survey, GridSurvey) else GridSurvey(type="grid", axes={})
+        if grid.axes and isinstance(config.evaluation, MemoryOptions) and config.evaluation.laws:
+            cure = "survey one with evaluation=memory, whose law is the controller"
+            raise ConfigurationError(f"survey.axes: several laws have their own values (evaluation.laws); {cure}")
         axes = {name: axis_values(spec, name) for name, spec in grid.axes.items()} | dict(evaluation.axes)
         fixed = {name: parameters[name] for name in evaluation.design_variables if name not in axes}
         return Grid(axes, grid.slice or evaluation.sliced_by, grid.baseline, fixed)
@@ -144,13 +147,23 @@ def build_checked(config: RunConfig) -> tuple[Evaluation, Survey]:
     _check_kinds(config)
     _check_measures(config)
     evaluation = build_evaluation(config)
-    try:
-        refused = evaluation.solver.supports(evaluation.loop({}))
-    except ArgumentError as error:
-        raise ConfigurationError(f"controller.{error.name} = {error.value}: {error.allowed}") from error
-    if refused is not None:
-        raise ConfigurationError(f"solver.type = {config.solver.type}: {refused}")
+    _check_loops(config, evaluation)
     return evaluation, build_survey(config, evaluation)
+
+
+def _check_loops(config: RunConfig, evaluation: Evaluation) -> None:
+    """The loop of the controller, or of each of several laws, can be built and is one for the solver."""
+    given = config.evaluation
+    laws = list(given.laws) if isinstance(given, MemoryOptions) else []
+    for number, name in enumerate(laws or [""]):
+        try:
+            refused = evaluation.solver.supports(evaluation.loop({LAW_NUMBER: float(number)} if laws else {}))
+        except ArgumentError as error:
+            place = f"evaluation.laws.{name}.values" if laws else "controller"
+            raise ConfigurationError(f"{place}.{error.name} = {error.value}: {error.allowed}") from error
+        if refused is not None:
+            place = f"evaluation.laws.{name}.type" if laws else f"solver.type = {config.solver.type}"
+            raise ConfigurationError(f"{place}: {refused}")
 
 
 def _check_kinds(config: RunConfig) -> None:

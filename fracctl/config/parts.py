@@ -59,8 +59,8 @@ def initial_condition(value: Any, info: ValidationInfo) -> Strict:
     options = states_schema(state_keys(plant)).model_validate(plain(value))
     given = options.model_dump()
     if given["units"] == "si" and plant.scales is None:
-        cure = "set plant.scales, or give dimensionless values"
-        raise refuse(refusal(("units",), "si", f"needs a plant with scales; {cure}"))
+        cure = "set plant.scales, or give" if type(plant) is LinearPlant else f"{type(plant).__name__} has none; give"
+        raise refuse(refusal(("units",), "si", f"needs a plant with scales; {cure} dimensionless values"))
     if not any(given[name] for name in plant.state_names):
         states = ", ".join(plant.state_names)
         still = f"nothing moves, for all states of the plant are 0; set one of {states}"

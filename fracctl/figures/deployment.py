@@ -13,6 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fracctl.arrays import Floats
+from fracctl.errors import suggestion
 from fracctl.figures import labels
 from fracctl.figures.results import FigureError, Results, Selection, chosen
 from fracctl.figures.style import CYCLE, FULL_WIDTH_IN, GREY
@@ -64,7 +65,7 @@ def build(results: Results, selection: Selection) -> tuple[Figure, pd.DataFrame]
     """
     shows = selection.shows or "length"
     if shows not in _WORDS:
-        raise FigureError(f"shows = {shows}: must be one of {', '.join(_WORDS)}")
+        raise FigureError(f"shows = {shows}: must be one of {', '.join(_WORDS)}{suggestion(shows, _WORDS)}")
     curves = {name: _curves(results, selection, name, shows) for name in selection.initial_conditions}
     size = (FULL_WIDTH_IN, _PANEL_HEIGHT_IN * len(curves) + 0.3)
     figure = Figure(figsize=size, layout="constrained")

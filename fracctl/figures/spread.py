@@ -7,6 +7,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from fracctl.errors import suggestion
 from fracctl.figures import labels
 from fracctl.figures.results import FigureError, Results, Selection
 from fracctl.figures.style import CYCLE, FULL_WIDTH_IN, GREY
@@ -54,7 +55,9 @@ def _measures(results: Results, selection: Selection) -> list[str]:
     if selection.shows:
         wanted = [name.strip() for name in selection.shows.split(",")]
         if missing := [name for name in wanted if name not in rows]:
-            raise FigureError(f"the run does not measure {', '.join(missing)}")
+            raise FigureError(
+                f"the run does not measure {', '.join(missing)}{suggestion(missing[0], list(map(str, rows)))}"
+            )
         return wanted
     after = list(rows.columns).index("sample") + 1
     numbers = rows.columns[after:]
