@@ -133,6 +133,8 @@ def test_documents_name_targets_that_exist() -> None:
         "docs/time_delayed_feedback.md",
         "docs/method_of_steps.md",
         "docs/fractional_memory.md",
+        "docs/tether.md",
+        "docs/implicit_memory.md",
         "docs/margins.md",
     ],
 )
