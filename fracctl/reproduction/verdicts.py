@@ -47,5 +47,5 @@ def shown(computed: float | None, printed: Printed) -> Decimal | None:
     if computed is None or not math.isfinite(computed):
         return None
     if printed.relation != "=":
-        return Decimal(f"{computed:.{_DIGITS_OF_A_CLAIM}g}")
+        return Decimal(f"{computed + 0.0:.{_DIGITS_OF_A_CLAIM}g}")
     return Decimal(computed).quantize(printed.last_digit.scaleb(-1), ROUND_HALF_EVEN)

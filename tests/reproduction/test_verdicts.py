@@ -86,4 +86,5 @@ def test_numbers_are_shown_with_one_digit_more_than_printed() -> None:
     for text, computed, expected in (("2.0", 1.95, "1.95"), ("24", 23.99, "24.0"), ("0.00256", 0.0025648, "0.002565")):
         assert str(shown(computed, row(text, "1").published)) == expected
     assert str(shown(43.3871, row("> 0").published)) == "43.39"
+    assert str(shown(-0.0, row("> 0").published)) == "0"
     assert shown(math.inf, row("24", "1").published) is None
