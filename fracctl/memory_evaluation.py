@@ -15,6 +15,7 @@ from fracctl.dispersions import SAMPLE, Distribution, draws, spreads
 from fracctl.errors import ArgumentError, suggestion
 from fracctl.evaluation import COUNTERS, LAW_NUMBER, Conclusion, Evaluation, ParametrisedLaw, geometric_mean
 from fracctl.loop import ClosedLoop
+from fracctl.measures.tethers import targets
 
 if TYPE_CHECKING:
     from fracctl.meshwise import MeshTrajectory
@@ -204,13 +205,13 @@ class MemoryEvaluation(Evaluation):
 
     @property
     def sampled_columns(self) -> tuple[str, ...]:
-        """Columns of stored trajectories: states, controls, what the law would have liked to give, and q_d."""
-        further = (f"{what}_{component}" for what in ("demand", "reference") for component in self.plant.components)
+        """Columns of stored trajectories: states, controls, what the law would have liked to give, and its target."""
+        further = (f"{what}_{component}" for what in ("demand", "target") for component in self.plant.components)
         return (*super().sampled_columns, *further)
 
     def sampled(self, trajectory: Any, times: Floats) -> dict[str, Floats]:
         """Return the `sampled_columns` of a single trajectory at times (t,), (t,) each."""
-        wanted = trajectory.law.reference(times)[0].reshape(-1, len(times), len(self.plant.components))[0]
+        wanted = np.repeat(targets(trajectory), len(times), axis=0)
         samples = np.column_stack([trajectory(times), trajectory.control(times), trajectory.demand(times), wanted])
         return dict(zip(self.sampled_columns, samples.T, strict=True))
 

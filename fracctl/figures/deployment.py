@@ -22,8 +22,6 @@ _PANEL_HEIGHT_IN = 2.3
 _CLOSE = 0.05
 """Of the span: half the height of the close view."""
 _BAND = 0.02
-_DIGITS = 3
-"""Of a target: an approach is never quite there."""
 _DASHED_FROM = 3
 """Curves from here on are dashed: variants of a law often lie on it."""
 _APART = 0.01
@@ -117,7 +115,7 @@ def _values(results: Results, samples: pd.DataFrame, shows: str) -> Floats:
 
 
 def _target(samples: pd.DataFrame, shows: str) -> float:
-    column = f"reference_{shows}"
+    column = f"target_{shows}"
     return float(samples[column].iloc[-1]) if column in samples else 0.0
 
 
@@ -152,11 +150,11 @@ def _approach(ax: Axes, curves: list[_Curve], shows: str) -> None:
         ax.set_xlim(0.0, 0.2 * float(curves[0].periods[-1]))
         return
     reach = max(_CLOSE * curve.span or 1.1 * _late(curve) for curve in curves) or 1.0
-    targets = sorted({round(curve.target, _DIGITS) for curve in curves})
+    targets = sorted({curve.target for curve in curves})
     ax.set_ylim(targets[0] - reach, targets[-1] + reach)
     for target in targets:
         if shows == "length":
-            half = _BAND * max(curve.span for curve in curves if round(curve.target, _DIGITS) == target)
+            half = _BAND * max(curve.span for curve in curves if curve.target == target)
             ax.axhspan(target - half, target + half, color=GREY, alpha=0.12, linewidth=0.0)
         ax.axhline(target, color=GREY, linewidth=0.5, zorder=0)
 
