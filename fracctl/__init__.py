@@ -13,7 +13,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from fracctl import controllers, design, measures, plants, solvers, stability
+    from fracctl import controllers, design, measures, plants, sampled, solvers, stability
     from fracctl.execution.library import run
     from fracctl.loop import ClosedLoop
     from fracctl.solvers import solve
@@ -28,12 +28,13 @@ __all__ = [
     "measures",
     "plants",
     "run",
+    "sampled",
     "solve",
     "solvers",
     "stability",
 ]
 
-_ROOMS = ("controllers", "design", "measures", "plants", "solvers", "stability")
+_ROOMS = ("controllers", "design", "measures", "plants", "sampled", "solvers", "stability")
 _OBJECTS = {"ClosedLoop": "fracctl.loop", "run": "fracctl.execution.library", "solve": "fracctl.solvers"}
 
 

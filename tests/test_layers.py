@@ -31,6 +31,7 @@ BOTTOM_UP = (
     "stability",
     "design",
     "measures",
+    "sampled",
     "evaluation",
     "delayed_evaluation",
     "memory_evaluation",

@@ -37,6 +37,8 @@ class FrequencyResponse:
         UnsupportedError: the loop is not linear, or has delays.
     """
 
+    ends: tuple[float, ...] = (NEXT_TO_ZERO,)
+
     def __init__(self, loop: ClosedLoop) -> None:
         self.system = loop.system
         assert isinstance(loop.plant, LinearPlant)

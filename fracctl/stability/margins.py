@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -106,11 +106,7 @@ def margins(loop: ClosedLoop) -> Margins:
     grid = response.grid()
     for first in range(0, sound.size, _AT_ONCE):
         rows = sound[first : first + _AT_ONCE]
-        on_grid = response(grid[None], rows)
-        values = _peaks(response, rows, grid, on_grid)
-        if response.controls == 1:
-            values |= _gain_margins(response, rows, grid, on_grid) | _phase_margins(response, rows, grid, on_grid)
-        for name, column in values.items():
+        for name, column in of_response(response, rows, grid).items():
             found[name][rows] = column
     assert isinstance(loop.plant, LinearPlant)
     if loop.plant.scales is not None:
@@ -118,7 +114,29 @@ def margins(loop: ClosedLoop) -> Margins:
     return Margins(**({name: column.tolist()[0] for name, column in found.items()} if loop.batch is None else found))
 
 
-def _peaks(response: FrequencyResponse, rows: Array, grid: Floats, on_grid: _Pair) -> dict[str, Floats]:
+class Response(Protocol):
+    """Controller and plant as matrices C and M over frequency, with the loop gain L = C M⁻¹."""
+
+    controls: int
+    """Number m of controls."""
+    ends: tuple[float, ...]
+    """Frequencies at which L is looked at beside the grid: next to 0, and where there is one the highest."""
+
+    def __call__(self, omega: Floats, rows: Array) -> _Pair:
+        """Return C and M of the members `rows` (n,) at frequencies (1, k) or (n, k), (n, k, m, m) each."""
+        ...
+
+
+def of_response(response: Response, rows: Array, grid: Floats) -> dict[str, Floats]:
+    """Return the fields of `Margins` for stable members (n,) whose curves a grid (k,) resolves, (n,) each."""
+    on_grid = response(grid[None], rows)
+    values = _peaks(response, rows, grid, on_grid)
+    if response.controls == 1:
+        values |= _gain_margins(response, rows, grid, on_grid) | _phase_margins(response, rows, grid, on_grid)
+    return values
+
+
+def _peaks(response: Response, rows: Array, grid: Floats, on_grid: _Pair) -> dict[str, Floats]:
     """Return peaks of S, T and S - T with their limits at both ends."""
     names = ("sensitivity_peak", "complementary_peak", "disk_margin")
     found, members = {}, np.arange(rows.size)
@@ -128,8 +146,9 @@ def _peaks(response: FrequencyResponse, rows: Array, grid: Floats, on_grid: _Pai
             return _sensitivity(response(omega, rows[members]), kind)
 
         value, where = largest(curve, grid, _sensitivity(on_grid, kind))
-        at_zero = curve(np.full((1, 1), NEXT_TO_ZERO), members)[:, 0]
-        value, where = np.maximum(value, at_zero), np.where(at_zero > value, 0.0, where)
+        for end in response.ends:
+            there = curve(np.full((1, 1), end), members)[:, 0]
+            value, where = np.maximum(value, there), np.where(there > value, 0.0 if end == NEXT_TO_ZERO else end, where)
         found[name] = np.maximum(value, limit)
         if kind == 0:
             found["sensitivity_frequency"] = np.where(value > limit, where, np.inf)
@@ -142,16 +161,17 @@ def _sensitivity(pair: _Pair, kind: int) -> Floats:
     return gain(over((plant, control, plant - control)[kind], plant + control))
 
 
-def _gain_margins(response: FrequencyResponse, rows: Array, grid: Floats, on_grid: _Pair) -> dict[str, Floats]:
+def _gain_margins(response: Response, rows: Array, grid: Floats, on_grid: _Pair) -> dict[str, Floats]:
     """Return the factors on L with which it comes to -1, from its crossings of the negative real axis."""
 
     def curve(omega: Floats, members: Array) -> Floats:
         return _sine(response(omega, rows[members]))
 
-    everyone, zero = np.arange(rows.size), np.full((rows.size, 1), NEXT_TO_ZERO)
+    everyone = np.arange(rows.size)
     members, omega = roots(curve, grid, _sine(on_grid))
-    at_zero = everyone[np.abs(curve(zero, everyone)[:, 0]) < _REAL]
-    members, omega = np.concatenate([members, at_zero]), np.concatenate([omega, zero[at_zero, 0]])
+    for end in response.ends:
+        real = everyone[np.abs(curve(np.full((1, 1), end), everyone)[:, 0]) < _REAL]
+        members, omega = np.concatenate([members, real]), np.concatenate([omega, np.full(real.size, end)])
     control, plant = (values[:, 0, 0, 0] for values in response(omega[:, None], rows[members]))
     negative = (control * plant.conj()).real <= 0.0
     with np.errstate(divide="ignore"):
@@ -163,7 +183,7 @@ def _gain_margins(response: FrequencyResponse, rows: Array, grid: Floats, on_gri
     return {"gain_margin": above, "gain_reduction": below}
 
 
-def _phase_margins(response: FrequencyResponse, rows: Array, grid: Floats, on_grid: _Pair) -> dict[str, Floats]:
+def _phase_margins(response: Response, rows: Array, grid: Floats, on_grid: _Pair) -> dict[str, Floats]:
     """Return the least phase and the least delay with which L comes to -1, from the crossings of |L| = 1."""
 
     def curve(omega: Floats, members: Array) -> Floats:
