@@ -6,7 +6,7 @@ import sys
 from collections.abc import Sequence
 from types import ModuleType
 
-from fracctl.cli import listing, output, reproduce, run, show, validate
+from fracctl.cli import export, listing, output, reproduce, run, show, validate
 from fracctl.cli.failure import report
 from fracctl.errors import UsageError, suggestion
 
@@ -17,6 +17,7 @@ COMMANDS: dict[str, ModuleType] = {
     "list": listing,
     "show": show,
     "validate": validate,
+    "export": export,
 }
 
 _HELP = """\
