@@ -18,6 +18,8 @@ from fracctl.stability.margins import Margins, of_response
 _LOWEST, _PER_DECADE = 1e-5, 48
 """Lower end of the grid, over the plant's unit of frequency and the Nyquist frequency, and its density."""
 _NEAR = np.concatenate([side * 10.0 ** np.arange(-6.0, -1.0, 0.5) for side in (-1.0, 1.0)])
+_DOUBLINGS = 50
+"""2^50 periods: a pole as near to the unit circle as numbers allow."""
 _MOST_STATES = 1500
 """Of a loop whose poles are computed."""
 
@@ -152,19 +154,32 @@ def noise_rms(
         velocity_noise: rms of the noise of each velocity.
 
     Raises:
-        UnsupportedError: the plant is not linear.
+        UnsupportedError: the plant is not linear, or the loop not stable.
     """
-    from scipy.linalg import solve_discrete_lyapunov
-
     loop, matrix = SampledResponse(plant, controller), closed_loop(plant, controller)
     n, q, m = len(loop.transition), controller.n_states, controller.n_controls
     entering = np.zeros((len(matrix), 2 * m))
     entering[n : n + q] = controller.b
-    entering[n + q : n + q + m if loop.whole or loop.past.any() else n + q] = controller.d[: len(entering) - n - q]
+    if len(matrix) > n + q:
+        entering[n + q : n + q + m] = controller.d
     if not loop.whole:
         entering[:n] = loop.present @ controller.d
     noise = np.diag(np.repeat([position_noise, velocity_noise], m) ** 2)
-    spread = solve_discrete_lyapunov(matrix, entering @ noise @ entering.T)
+    spread = _kept_up(matrix, entering @ noise @ entering.T)
     demand = np.concatenate([controller.d, controller.c, np.zeros((m, len(matrix) - n - q))], axis=1)
     control = demand @ spread @ demand.T + controller.d @ noise @ controller.d.T
     return np.sqrt(np.diag(spread)[:m]), np.sqrt(np.diag(control))
+
+
+def _kept_up(matrix: Floats, entering: Floats) -> Floats:
+    """Return P = F P Fᵀ + Q as Σ_k F^k Q F^kᵀ by doubling: every sum is one of positive parts."""
+    spread, power = entering, matrix
+    for _ in range(_DOUBLINGS):
+        with np.errstate(all="ignore"):
+            added = power @ spread @ power.T
+        if not np.isfinite(added).all():
+            break
+        spread, power = spread + added, power @ power
+        if np.abs(added).max() <= 1e-15 * np.abs(spread).max():
+            return spread
+    raise UnsupportedError("noise has no rms in a loop that is not stable")

@@ -23,6 +23,7 @@ from fracctl.sampled import (
     settling_times,
     simulate,
 )
+from fracctl.sampled.propagation import held
 
 PLANT = HCWOutOfPlane()
 ORBIT = 2.0 * np.pi
@@ -53,6 +54,22 @@ def test_the_length_of_the_memory_decides_how_the_tail_ends() -> None:
     settled = settling_times(flight, [1e-5, 1e-7]) / ORBIT
     assert np.round(settled, 3)[0] == 0.547
     assert np.round(settled, 2)[1] == 1.07
+
+
+def test_emptying_the_memory_now_and_then_is_another_law() -> None:
+    """Caputo's derivative from the last restart jumps there; computed independently, 0.798 and 1.409 orbit."""
+    period = dimensionless_time(PLANT, 10.0)
+    controller = SampledLaw(PUBLISHED, Window(160), period).discrete(1)
+    transition, input_matrix = held(PLANT, period)
+    x, positions = np.array([IC1]), []
+    for k in range(2000):
+        if k % 159 == 0:
+            memory = controller.start(x)
+        memory, control = controller.step(memory, x)
+        positions.append(abs(x[0, 0]))
+        x = x @ transition.T + control @ input_matrix.T
+    last = [np.flatnonzero(np.array(positions) > delta)[-1] * period / ORBIT for delta in (1e-5, 1e-7)]
+    np.testing.assert_allclose(last, [0.7976, 1.4093], atol=1.1e-3)
 
 
 def test_the_whole_memory_settles_as_the_law_does() -> None:

@@ -115,6 +115,9 @@ def test_noise_leaves_what_lyapunovs_equation_says(delay: float) -> None:
 
 
 def test_an_unstable_loop_has_no_margins() -> None:
+    controller = SampledLaw(PD(0.55, 2.0), MODES, 2.5).discrete(1)
+    with pytest.raises(UnsupportedError, match="not stable"):
+        noise_rms(PLANT, controller, 1.0, 0.0)
     found = sampled_margins(PLANT, SampledLaw(PD(0.55, 2.0), MODES, 2.5).discrete(1))
     assert found.stable is False
     assert np.isnan(found.sensitivity_peak)
