@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fracctl.arrays import Array, Booleans, Floats, finite
+from fracctl.arrays import Booleans, Floats, finite
 from fracctl.controllers.saturation import Saturation
 from fracctl.errors import ArgumentError
 
@@ -55,8 +55,3 @@ class Actuator:
             size = np.abs(control)
             control = np.where(size < least, np.where(size < 0.5 * least, 0.0, np.copysign(least, control)), control)
         return control, limited
-
-    def take(self, rows: Array) -> Actuator:
-        """Return the actuators of some members."""
-        cut = None if self.saturation is None else self.saturation.take(rows)
-        return Actuator(cut, self.deadband, self.impulse_bit)

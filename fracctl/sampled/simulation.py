@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Literal
 
 import numpy as np
@@ -81,9 +81,7 @@ def simulate(
     x, states, commands = start, np.empty((count + 1, *start.shape)), np.zeros((count, len(start), m))
     limits = np.zeros(len(start))
     states[0] = x
-    whole, late = divmod(controller.delay, 1.0)
-    before, after = (advance_by(plant, share * controller.period) for share in (late, 1.0 - late))
-    idle = np.zeros((len(start), m))
+    move = _mover(plant, controller)
     memory = measured = np.zeros(0)
     for k in range(count):
         if k % told.every == 0:
@@ -94,11 +92,7 @@ def simulate(
         commands[k], limited = thrusters(demand, controller.period)
         limits += limited
         memory = _kept(controller, memory, following, limited, measured, anti_windup)
-        newest = k - int(whole)
-        if late:
-            x = before(k * controller.period, x, commands[newest - 1] if newest >= 1 else idle)
-        x = after((k + late) * controller.period, x, commands[newest] if newest >= 0 else idle)
-        states[k + 1] = x
+        states[k + 1] = x = move(k, x, commands)
     return SampledTrajectory(
         plant,
         controller.period,
@@ -109,6 +103,20 @@ def simulate(
         np.where(np.isfinite(x).all(axis=1), "ok", "diverged").astype(object),
         np.ndim(initial_state) == 2,
     )
+
+
+def _mover(plant: StatePlant, controller: DiscreteController) -> Callable[[int, Floats, Floats], Floats]:
+    """Return what takes the states of period k on to the next, under the commands (K, b, m) known by then."""
+    whole, late = divmod(controller.delay, 1.0)
+    before, after = (advance_by(plant, share * controller.period) for share in (late, 1.0 - late))
+
+    def move(k: int, x: Floats, commands: Floats) -> Floats:
+        newest, idle = k - int(whole), np.zeros(commands.shape[1:])
+        if late:
+            x = before(k * controller.period, x, commands[newest - 1] if newest >= 1 else idle)
+        return after((k + late) * controller.period, x, commands[newest] if newest >= 0 else idle)
+
+    return move
 
 
 def _kept(

@@ -55,10 +55,10 @@ class SampledTrajectory:
         return self.commands if self.batched else self.commands[0]
 
     def __call__(self, times: ArrayLike) -> Floats:
-        """Return positions at any times (t,) in [0, horizon], (b, t, m), or (t, m) for a single flight.
+        """Return states at any times (t,) in [0, horizon], (b, t, n), or (t, n) for a single flight.
 
-        By Hermite's cubics through positions and velocities at the samples; between them the control may jump by |Δu|,
-        so the error is |Δu| T_s²/50 at most, and of order T_s⁴ where it does not.
+        By Hermite's cubics through positions and velocities at the samples. Between them the control may jump by |Δu|:
+        then positions err by |Δu| T_s²/50 at most, otherwise by the order T_s⁴.
 
         Raises:
             ArgumentError: a time lies outside [0, horizon].
@@ -68,7 +68,9 @@ class SampledTrajectory:
         if wrong.size:
             raise ArgumentError("times", float(wrong[0]), f"must lie in [0, {self.horizon:g}], the flight")
         k = np.minimum((t / self.period).astype(int), self.at_samples.shape[1] - 2)
-        out = cubic(self.cubics(k), (t / self.period - k)[:, None])
+        coefficients, theta = self.cubics(k), (t / self.period - k)[:, None]
+        slope = (coefficients[1] + theta * (2.0 * coefficients[2] + 3.0 * theta * coefficients[3])) / self.period
+        out = np.concatenate([cubic(coefficients, theta), slope], axis=-1)
         return out if self.batched else out[0]
 
     def control(self, times: ArrayLike) -> Floats:

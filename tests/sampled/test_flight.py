@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 import fracctl as fc
 from fracctl.arrays import Floats
 from fracctl.controllers import PD, LinearLaw, PDAlpha, PDLag, PILambdaDMu
 from fracctl.errors import ArgumentError
-from fracctl.plants import HCW, HCWOutOfPlane
+from fracctl.plants import HCW, Chief, HCWOutOfPlane
 from fracctl.plants.relative_motion import RelativeMotion
 from fracctl.sampled import (
     Actuator,
@@ -100,7 +103,11 @@ def test_short_periods_converge_to_the_law_at_first_order(law: LinearLaw, feed: 
 def test_free_motion_is_exact() -> None:
     flight = simulate(PLANT, SampledLaw(PD(0.0, 0.0), Window(2), 0.3), [1.0, 0.0], 30.0)
     np.testing.assert_allclose(flight.states[:, 0], np.cos(flight.times), atol=1e-12)
-    np.testing.assert_allclose(flight(np.array([0.15]))[:, 0], np.cos(0.15), atol=3e-5)
+    between = flight(np.array([0.15, 0.1]))
+    np.testing.assert_allclose(between[:, 0], np.cos([0.15, 0.1]), atol=3e-5)
+    np.testing.assert_allclose(between[:, 1], -np.sin([0.15, 0.1]), atol=3e-4)
+    with pytest.raises(ArgumentError, match="`times`"):
+        flight([31.0])
 
 
 def test_a_held_control_and_its_delay_in_closed_form() -> None:
@@ -147,6 +154,22 @@ def test_short_distances_make_nonlinear_motion_linear() -> None:
     assert departures[0] / departures[1] == pytest.approx(100.0, rel=0.05)
 
 
+def test_a_plant_that_depends_on_time_is_asked_at_the_right_times() -> None:
+    """Held controls on an elliptic orbit, against SciPy's LSODA from one change of the control to the next."""
+    plant = RelativeMotion(eccentricity=0.3)
+    flight = simulate(plant, SampledLaw(PD(np.eye(3), np.eye(3)), Window(2), 0.3, 0.4), [1e-3] * 6, 1.5)
+    x = np.full(6, 1e-3)
+    for k in range(5):
+        for begin, end, u in ((0.0, 0.4, flight.controls[k - 1] if k else np.zeros(3)), (0.4, 1.0, flight.controls[k])):
+            span = (0.3 * (k + begin), 0.3 * (k + end))
+            x = solve_ivp(_rates, span, x, "LSODA", args=(plant, u), rtol=1e-11, atol=1e-16).y[:, -1]
+        np.testing.assert_allclose(x, flight.states[k + 1], rtol=1e-8)
+
+
+def _rates(t: float, x: Floats, plant: RelativeMotion, u: Floats) -> Floats:
+    return plant.rates(np.array([t]), x[None], u[None])[0]
+
+
 def test_measurements_are_held_and_biased() -> None:
     """Every second period only, and a bias moves where the loop comes to rest: (1 + k_p) ξ = -k_p β."""
     law = SampledLaw(PD(1.0, 2.0), Window(2), 0.1, feed="velocity")
@@ -179,3 +202,23 @@ def test_refusals(options: dict[str, object], name: str) -> None:
     given = {"initial_state": IC1, "horizon": 1.0} | options
     with pytest.raises(ArgumentError, match=f"`{name}`"):
         simulate(PLANT, SampledLaw(PUBLISHED, Window(5), 0.1), **given)  # type: ignore[arg-type]
+
+
+@pytest.mark.slow
+def test_five_hundred_noisy_limited_nonlinear_flights_take_less_than_a_minute() -> None:
+    """Six orbits at 10 s; measured 15 s of one core."""
+    plant = RelativeMotion(Chief())
+    period = dimensionless_time(plant, 10.0)
+    starts = [-1e-3, 0.0, 0.0, 0.0, 2e-3, 2e-3] * np.random.default_rng(1).uniform(0.8, 1.2, (500, 6))
+    begin = time.process_time()
+    flights = simulate(
+        plant,
+        SampledLaw(PDAlpha(*GAINS), Window(159), period, delay=0.2),
+        starts,
+        12.0 * np.pi,
+        actuator=Actuator(fc.controllers.Saturation(4e-3), impulse_bit=1e-7),
+        navigation=Navigation(5e-7, 3e-6),
+    )
+    settled = settling_times(flights, [1e-4])
+    assert time.process_time() - begin < 60.0
+    assert np.isfinite(settled).all()
