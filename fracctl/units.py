@@ -9,6 +9,10 @@ from fracctl.errors import ArgumentError
 
 EARTH_GRAVITATIONAL_PARAMETER_KM3_S2 = 398600.4418
 """Geocentric gravitational constant GM, IERS Conventions (2010), Table 1.1."""
+EARTH_RADIUS_KM = 6378.137
+"""Equatorial radius of the Earth, WGS 84."""
+STANDARD_GRAVITY_M_S2 = 9.80665
+"""In which specific impulses are weighed, 3rd General Conference on Weights and Measures (1901)."""
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ BOTTOM_UP = (
     "errors",
     "units",
     "arrays",
+    "elements",
     "dispersions",
     "compiling",
     "fractional",

@@ -51,7 +51,7 @@ def _plant(config: RunConfig, plant: LinearPlant) -> Iterator[_Row]:
     yield "plant", _sentence(plant, config.plant.type, "")
     chief = getattr(plant, "chief", None)
     if isinstance(chief, Chief):
-        orbit = f"circular orbit, radius {number(chief.semi_major_axis_km)} km"
+        orbit = f"circular orbit, radius {number(chief.a_km)} km"
         yield "", f"chief on a {orbit}, inclination {number(chief.inclination_deg)}°"
     scales = plant.scales
     if scales is None:

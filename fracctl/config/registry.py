@@ -27,6 +27,7 @@ BUILT_IN: Mapping[str, Mapping[str, str]] = {
         "hcw_out_of_plane": "fracctl.plants:HCWOutOfPlane",
         "linear": "fracctl.plants:LinearPlant",
         "libration": "fracctl.plants:Libration",
+        "tschauner_hempel": "fracctl.plants:TschaunerHempel",
         "relative_motion": "fracctl.plants:RelativeMotion",
         "perturbed_relative_motion": "fracctl.plants:PerturbedRelativeMotion",
         "rotating_ellipsoid": "fracctl.plants:RotatingEllipsoid",

@@ -19,7 +19,7 @@ from fracctl.figures import labels
 from fracctl.figures.curves import Curve, curves_of, table_of
 from fracctl.figures.results import Results, Selection
 from fracctl.figures.style import BLUE, FULL_WIDTH_IN, GREY, ORANGE
-from fracctl.plants import PerturbedRelativeMotion, RelativeMotion, RotatingEllipsoid
+from fracctl.plants import PerturbedRelativeMotion, RelativeMotion, RotatingEllipsoid, TschaunerHempel
 
 _PANEL_HEIGHT_IN = 2.6
 _LEGEND_HEIGHT_IN = 0.3
@@ -113,7 +113,7 @@ class _Axis(NamedTuple):
 def _axes(results: Results, components: Sequence[str]) -> tuple[_Axis, _Axis]:
     """What is drawn to the right and upwards."""
     length = "" if results.scales is None else "km"
-    if isinstance(results.plant, RelativeMotion | PerturbedRelativeMotion):
+    if isinstance(results.plant, RelativeMotion | PerturbedRelativeMotion | TschaunerHempel):
         return _Axis("y", f"{length}, frame rtn", "along-track "), _Axis("x", length, "radial ")
     if len(components) > 1:
         return _Axis(components[0], length), _Axis(components[1], length)

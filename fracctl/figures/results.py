@@ -35,7 +35,7 @@ _DESIGN = (
 )
 """What columns of design variables begin with."""
 _OPTIONS = ("objective", "initial_conditions", "shows")
-_IN_ORBIT = ("tether", "libration", "relative_motion", "perturbed_relative_motion")
+_IN_ORBIT = ("tether", "libration", "relative_motion", "tschauner_hempel", "perturbed_relative_motion")
 """Plants whose time 2π is an orbit."""
 
 

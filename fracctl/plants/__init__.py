@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from fracctl.plants.relative_motion import RelativeMotion
     from fracctl.plants.rotating_ellipsoid import RotatingEllipsoid
     from fracctl.plants.tether import Tether
+    from fracctl.plants.tschauner_hempel import TschaunerHempel
 
 __all__ = [
     "HCW",
@@ -35,6 +36,7 @@ __all__ = [
     "Section",
     "StatePlant",
     "Tether",
+    "TschaunerHempel",
 ]
 
 _COMPILED = {
@@ -43,6 +45,7 @@ _COMPILED = {
     "RelativeMotion": "relative_motion",
     "RotatingEllipsoid": "rotating_ellipsoid",
     "Tether": "tether",
+    "TschaunerHempel": "tschauner_hempel",
 }
 
 

@@ -34,12 +34,13 @@ class LeaderOrbit:
     It is integrated (DOP853, to 1e-13) as far as somebody asks, turn by turn, and kept as Chebyshev polynomials.
 
     Args:
-        eccentricity: e of the osculating orbit at time 0, at perigee.
+        eccentricity: e of the osculating orbit at time 0.
         inclination: i in radians.
         argument: argument of latitude at time 0 in radians.
         oblateness: k = J2 (R/a)².
         drag: d = ½ ρ C_D A/m a, with the density at r = a.
         scale_height: η of the density, over a.
+        anomaly: true anomaly at time 0 in radians.
     """
 
     def __init__(
@@ -50,10 +51,13 @@ class LeaderOrbit:
         oblateness: float,
         drag: float,
         scale_height: float,
+        anomaly: float = 0.0,
     ) -> None:
         e, s = eccentricity, math.sin(inclination)
         pole = [s * math.sin(argument), s * math.cos(argument), math.cos(inclination)]
-        self._end = np.array([1.0 - e, 0.0, math.sqrt(1.0 - e * e), *pole])
+        momentum = math.sqrt(1.0 - e * e)
+        r, climb = (1.0 - e * e) / (1.0 + e * math.cos(anomaly)), e * math.sin(anomaly) / momentum
+        self._end = np.array([r, climb, momentum, *pole])
         self._constants = np.array([oblateness, drag, scale_height])
         distance = math.acosh(1.0 / e) - math.sqrt(1.0 - e * e) if e > 0.0 else math.inf
         self._pieces = max(_FEWEST_PIECES, math.ceil(0.5 * _TURN * _REACH / distance))

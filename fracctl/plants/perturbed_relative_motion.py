@@ -9,16 +9,17 @@ import numpy as np
 
 from fracctl.arrays import Floats
 from fracctl.compiling import compiled_with
+from fracctl.elements import Elements
 from fracctl.errors import ArgumentError
 from fracctl.plants.function import FunctionPlant
 from fracctl.plants.hcw import Chief
 from fracctl.plants.leader_orbit import LeaderOrbit
+from fracctl.plants.relative_motion import checked_phase
 from fracctl.plants.state import SecondOrder
+from fracctl.units import EARTH_RADIUS_KM
 
 EARTH_J2 = 1.08262668e-3
 """Second zonal harmonic of the Earth's gravity, from C₂₀ of EGM96."""
-EARTH_RADIUS_KM = 6378.137
-"""Equatorial radius of the Earth, WGS 84."""
 
 
 class PerturbedRelativeMotion(SecondOrder):
@@ -33,13 +34,13 @@ class PerturbedRelativeMotion(SecondOrder):
 
     with the polar axis p and the inertial velocity v; the first term's difference is computed without cancellation, as
     in `RelativeMotion`. The atmosphere is a spherical exponential one at rest. Lengths over the leader's semi-major
-    axis a, time over its Keplerian 1/n, both of the orbit that osculates at time 0, when the leader is at perigee.
-    Without J2 and drag it is `RelativeMotion`.
+    axis a, time over its Keplerian 1/n, both of the orbit that osculates at time 0. Without J2 and drag it is
+    `RelativeMotion`.
 
     Args:
-        leader: semi-major axis, inclination and gravitational parameter of the orbit that osculates at time 0.
+        leader: the orbit that osculates at time 0, and the argument of latitude then.
         eccentricity: e in [0, 1).
-        argument_of_latitude_deg: of the leader at time 0, from the ascending node, in degrees.
+        true_anomaly_deg: of the leader at time 0, in degrees; 0 at perigee.
         j2: J2 of the planet; 0 for none.
         planet_radius_km: equatorial radius in km.
         density_kg_m3: of the atmosphere at the height of the semi-major axis, in kg/m³; 0 for none.
@@ -57,7 +58,7 @@ class PerturbedRelativeMotion(SecondOrder):
         self,
         leader: Chief | None = None,
         eccentricity: float = 0.0,
-        argument_of_latitude_deg: float = 0.0,
+        true_anomaly_deg: float = 0.0,
         j2: float = EARTH_J2,
         planet_radius_km: float = EARTH_RADIUS_KM,
         density_kg_m3: float = 0.0,
@@ -65,11 +66,9 @@ class PerturbedRelativeMotion(SecondOrder):
         leader_ballistic_m2_kg: float = 0.01,
         follower_ballistic_m2_kg: float = 0.01,
     ) -> None:
-        if not 0.0 <= eccentricity < 1.0:
-            raise ArgumentError("eccentricity", eccentricity, "must lie in [0, 1)")
-        for name, value in (("argument_of_latitude_deg", argument_of_latitude_deg), ("j2", j2)):
-            if not math.isfinite(value):
-                raise ArgumentError(name, value, "must be a finite number")
+        self.eccentricity, self.true_anomaly_deg = checked_phase(eccentricity, true_anomaly_deg)
+        if not math.isfinite(j2):
+            raise ArgumentError("j2", j2, "must be a finite number")
         for name, value in (("planet_radius_km", planet_radius_km), ("scale_height_km", scale_height_km)):
             if not (math.isfinite(value) and value > 0.0):
                 raise ArgumentError(name, value, "must be a positive number")
@@ -82,13 +81,24 @@ class PerturbedRelativeMotion(SecondOrder):
             if not (math.isfinite(value) and value >= 0.0):
                 raise ArgumentError(name, value, "must not be negative")
         self.leader = leader or Chief(semi_major_axis_km=6700.0)
-        self.eccentricity, self.scales = float(eccentricity), self.leader.scales
-        a_km = self.leader.semi_major_axis_km
+        self.scales, a_km = self.leader.scales, self.leader.a_km
         oblateness, height = j2 * (planet_radius_km / a_km) ** 2, scale_height_km / a_km
         drags = [0.5 * density_kg_m3 * b * 1e3 * a_km for b in (leader_ballistic_m2_kg, follower_ballistic_m2_kg)]
         self._constants = np.array([oblateness, *drags, height])
-        inclination, argument = math.radians(self.leader.inclination_deg), math.radians(argument_of_latitude_deg)
-        self._orbit = LeaderOrbit(self.eccentricity, inclination, argument, oblateness, drags[0], height)
+        angles = (self.leader.inclination_deg, self.leader.argument_of_latitude_deg, self.true_anomaly_deg)
+        inclination, argument, anomaly = (math.radians(angle) for angle in angles)
+        self._orbit = LeaderOrbit(self.eccentricity, inclination, argument, oblateness, drags[0], height, anomaly)
+
+    @property
+    def chief_elements(self) -> Elements:
+        """Those of the leader's osculating orbit at time 0."""
+        return self.leader.elements(self.eccentricity, self.true_anomaly_deg)
+
+    @property
+    def frame_rate(self) -> Floats:
+        """Angular velocity [r a_n/h, 0, h/r²] of the frame at time 0, (3,)."""
+        r, _, h, px, _, pz = self.leader_motion(np.zeros(1))[0]
+        return np.array([-3.0 * self._constants[0] / r**3 * px * pz / h, 0.0, h / r**2])
 
     @cached_property
     def period(self) -> float:  # type: ignore[override]

@@ -8,6 +8,7 @@ import numpy as np
 
 from fracctl.arrays import Floats
 from fracctl.compiling import compiled_with
+from fracctl.elements import Elements
 from fracctl.errors import ArgumentError
 from fracctl.plants.hcw import Chief
 from fracctl.plants.state import SecondOrder
@@ -24,34 +25,38 @@ class RelativeMotion(SecondOrder):
         g = -[x - r f, y, z]/(r³ (1 + f)),    f = (1 + q)^{3/2} - 1 = q (3 + 3q + q²)/(1 + (1 + q)^{3/2}),
         q = (2rx + x² + y² + z²)/r²
 
-    Lengths over the leader's semi-major axis a, time over 1/n; at time 0 the leader is at perigee. Its radius r and
-    rate ω come from Kepler's equation.
+    Lengths over the leader's semi-major axis a, time over 1/n. Its radius r and rate ω come from Kepler's equation.
 
     Args:
-        leader: the orbit's semi-major axis and the gravitational parameter.
+        leader: the orbit's semi-major axis and the gravitational parameter; its angles matter to orbit elements only.
         eccentricity: e in [0, 1).
+        true_anomaly_deg: of the leader at time 0, in degrees; 0 at perigee.
 
     Raises:
-        ArgumentError: the orbit is not an ellipse.
+        ArgumentError: the orbit is not an ellipse, or a number is not finite.
     """
 
     components = ("x", "y", "z")
     period = 2.0 * math.pi
 
-    def __init__(self, leader: Chief | None = None, eccentricity: float = 0.0) -> None:
-        if not 0.0 <= eccentricity < 1.0:
-            raise ArgumentError("eccentricity", eccentricity, "must lie in [0, 1)")
+    def __init__(self, leader: Chief | None = None, eccentricity: float = 0.0, true_anomaly_deg: float = 0.0) -> None:
+        self.eccentricity, self.true_anomaly_deg = checked_phase(eccentricity, true_anomaly_deg)
         self.leader = leader or Chief(semi_major_axis_km=6700.0)
-        self.eccentricity = float(eccentricity)
         self.scales = self.leader.scales
+        self._mean_anomaly = mean_anomaly(self.eccentricity, math.radians(self.true_anomaly_deg))
+
+    @property
+    def chief_elements(self) -> Elements:
+        """Those of the leader at time 0."""
+        return self.leader.elements(self.eccentricity, self.true_anomaly_deg)
 
     def leader_motion(self, t: Floats) -> Floats:
         """Return r, ω and ω' at times (b,), (b, 3)."""
-        return _leader(np.ascontiguousarray(t), self.eccentricity)
+        return kepler_motion(t + self._mean_anomaly, self.eccentricity)
 
     def rates(self, t: Floats, x: Floats, u: Floats) -> Floats:
         """Return x' of x = [x, y, z, x', y', z'], (b, 6)."""
-        return _rates(_leader(t, self.eccentricity), x, u)
+        return _rates(self.leader_motion(t), x, u)
 
     def jacobians(self, t: Floats, x: Floats, u: Floats) -> tuple[Floats, Floats]:
         """Return ∂f/∂x, (b, 6, 6), and ∂f/∂u, (b, 6, 3)."""
@@ -70,9 +75,26 @@ class RelativeMotion(SecondOrder):
         return state, control
 
 
+def checked_phase(eccentricity: float, true_anomaly_deg: float) -> tuple[float, float]:
+    """Return both; raise ArgumentError unless the orbit is an ellipse and the angle a finite number."""
+    if not 0.0 <= eccentricity < 1.0:
+        raise ArgumentError("eccentricity", eccentricity, "must lie in [0, 1)")
+    if not math.isfinite(true_anomaly_deg):
+        raise ArgumentError("true_anomaly_deg", true_anomaly_deg, "must be a finite number")
+    return float(eccentricity), float(true_anomaly_deg)
+
+
+def mean_anomaly(eccentricity: float, true_anomaly: float) -> float:
+    """Return M in rad of a true anomaly in rad, in the same turn."""
+    half = 0.5 * math.remainder(true_anomaly, math.tau)
+    e = eccentricity
+    eccentric = 2.0 * math.atan2(math.sqrt(1.0 - e) * math.sin(half), math.sqrt(1.0 + e) * math.cos(half))
+    return eccentric - e * math.sin(eccentric) + math.tau * round((true_anomaly - 2.0 * half) / math.tau)
+
+
 @compiled_with(error_model="numpy")
-def _leader(t: Floats, e: float) -> Floats:
-    """Return r, ω, ω' of a Kepler orbit with a = n = 1, (b, 3)."""
+def kepler_motion(t: Floats, e: float) -> Floats:
+    """Return r, ω, ω' of a Kepler orbit with a = n = 1 at times from perigee (b,), (b, 3)."""
     out = np.empty((len(t), 3))
     momentum = math.sqrt(1.0 - e * e)
     for i in range(len(t)):

@@ -74,7 +74,9 @@ def test_all_errors_come_at_once() -> None:
         (["plant.type=moon"], f"plant.type = moon: must be one of {', '.join(names('plants'))}"),
         (["plant.chief.semi_major_axis_km=-1"], "plant.chief.semi_major_axis_km = -1: must be a positive number"),
         (["plant.chief.mass=1"], ("unknown key 'plant.chief.mass'; allowed: semi_major_axis_km, inclination_deg, "
-                                 "gravitational_parameter_km3_s2")),
+                                 "gravitational_parameter_km3_s2, altitude_km, raan_deg, argument_of_latitude_deg")),
+        (["plant.chief.altitude_km=500"], ("plant.chief.altitude_km = 500: must not be given beside semi_major_axis_km "
+                                          "= 10000; set one of the two to null")),
         (["plant.chief=5"], "plant.chief = 5: must be a mapping of options"),
         ([*LINEAR, "plant.damping=[[1,2],[3,4]]"],
          "plant.damping = [[1, 2], [3, 4]]: must have the shape of `stiffness`, (1, 1), but is of shape (2, 2)"),

@@ -69,6 +69,7 @@ COMPANIONS = {
     "plant=tether": ["experiment=libration", "initial_condition=own", "initial_condition.own.length=1"],
     "initial_condition=release_eccentric": ["experiment=tether_eccentric"],
     "controller=pd_alpha_full": ["plant=hcw"],
+    "plant=tschauner_hempel": ["experiment=nonlinear_ic1"],
     "controller=pd_alpha_relative": ["experiment=nonlinear_ic1"],
     "initial_condition=ic1_relative": ["experiment=nonlinear_ic1"],
     "controller=pd_lag_in_plane": ["plant=hcw_in_plane"],

@@ -57,7 +57,7 @@ def test_names() -> None:
 def test_scales_at_ten_thousand_kilometres() -> None:
     """The orbit of the paper: n = 6.313e-4 rad/s, T = 2.764 h, 6313 m/s, 3986 mm/s² (GM/a² = 3.986 m/s²)."""
     chief = Chief()
-    assert chief.semi_major_axis_km == 1e4
+    assert chief.a_km == 1e4
     assert chief.mean_motion_rad_s == pytest.approx(6.313e-4, rel=1e-4)
     scales = chief.scales
     assert scales.length_m == 1e7
@@ -84,7 +84,19 @@ def test_scales_follow_keplers_third_law() -> None:
     assert moon.mean_motion_rad_s == pytest.approx(np.sqrt(4902.8 / 1e12), rel=1e-14)
 
 
-@pytest.mark.parametrize("name", ["semi_major_axis_km", "gravitational_parameter_km3_s2"])
+def test_chief_by_its_altitude() -> None:
+    """500 km above the equator of WGS 84: a period of 94.6 min."""
+    chief = Chief(altitude_km=500.0)
+    assert chief.a_km == 6878.137
+    assert chief.scales.period_s / 60.0 == pytest.approx(94.62, abs=5e-3)
+    sentence = (
+        "`altitude_km` must not be given beside semi_major_axis_km = 7000, but is 500.0; set one of the two to null"
+    )
+    with pytest.raises(ArgumentError, match=sentence):
+        Chief(7000.0, altitude_km=500.0)
+
+
+@pytest.mark.parametrize("name", ["semi_major_axis_km", "altitude_km", "gravitational_parameter_km3_s2"])
 @pytest.mark.parametrize("value", [0.0, -1.0, np.nan, np.inf])
 def test_chief_refuses_what_is_no_orbit(name: str, value: float) -> None:
     with pytest.raises(ArgumentError, match=f"`{name}` must be a positive number, but is"):

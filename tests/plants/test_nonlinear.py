@@ -18,6 +18,7 @@ from fracctl.plants import (
     RelativeMotion,
     RotatingEllipsoid,
     StatePlant,
+    TschaunerHempel,
 )
 
 RNG_SEED = 7
@@ -25,7 +26,8 @@ PLANTS = [
     Libration(),
     RotatingEllipsoid(),
     RelativeMotion(),
-    RelativeMotion(eccentricity=0.3),
+    RelativeMotion(eccentricity=0.3, true_anomaly_deg=100.0),
+    TschaunerHempel(eccentricity=0.3, true_anomaly_deg=100.0),
     HCWInPlane(),
     FunctionPlant(lambda t, x, u: np.sin(x) * t[:, None] + x[:, ::-1] ** 2 + u, 2, 2),
 ]
@@ -93,7 +95,7 @@ def test_units_of_eros() -> None:
     assert 70.0 * 3600.0 / scales.time_s == pytest.approx(83.45, abs=5e-3)
 
 
-@pytest.mark.parametrize("e", [0.0, 0.005, 0.3])
+@pytest.mark.parametrize("e", [0.0, 0.005, 0.1, 0.3])
 def test_relative_motion_is_the_difference_of_two_kepler_orbits(e: float) -> None:
     """To 1e-9 km over three orbits, in the turning frame; starts 2 and 20 km away with a drift."""
     plant = RelativeMotion(Chief(6700.0, gravitational_parameter_km3_s2=398600.5), e)

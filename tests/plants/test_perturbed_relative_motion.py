@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -13,19 +15,25 @@ from fracctl.errors import ArgumentError, UnsupportedError
 from fracctl.loop import ClosedLoop
 from fracctl.measures import delta_v_per_orbit, drift_per_orbit
 from fracctl.plants import HCW, Chief, PerturbedRelativeMotion, RelativeMotion
-from fracctl.plants.perturbed_relative_motion import EARTH_J2, EARTH_RADIUS_KM
+from fracctl.plants.perturbed_relative_motion import EARTH_J2
 from fracctl.solvers import MethodOfSteps
+from fracctl.units import EARTH_RADIUS_KM
 
 GM, A_KM, TURN = 398600.5, 6700.0, 2.0 * np.pi
 LEADER = Chief(A_KM, inclination_deg=51.6, gravitational_parameter_km3_s2=GM)
 UNIT_S = LEADER.scales.time_s
 
 
+def at(argument_deg: float) -> Chief:
+    """The leader with another argument of latitude at time 0."""
+    return replace(LEADER, argument_of_latitude_deg=argument_deg)
+
+
 @pytest.mark.parametrize("e", [0.0, 0.005, 0.3])
 def test_without_perturbations_it_is_relative_motion(e: float) -> None:
     """To 1e-9 km over three orbits of a start 20 km away."""
     start, t = np.array([20.0, -2.0, 5.0, 0.0, -30.0, 4.0]) / A_KM, np.linspace(0.0, 3.0 * TURN, 31)
-    plants = RelativeMotion(LEADER, e), PerturbedRelativeMotion(LEADER, e, 30.0, j2=0.0)
+    plants = RelativeMotion(LEADER, e, 75.0), PerturbedRelativeMotion(at(30.0), e, 75.0, j2=0.0)
     one, other = (MethodOfSteps(400).solve(ClosedLoop(plant), start, 3.0 * TURN)(t) for plant in plants)
     np.testing.assert_allclose(other * A_KM, one * A_KM, rtol=0, atol=1e-9)
 
@@ -34,7 +42,7 @@ def test_without_perturbations_it_is_relative_motion(e: float) -> None:
 def test_two_satellites_in_inertial_axes(e: float) -> None:
     """J2 and drag in km and s by another integrator, turned into the leader's momentary frame; 1e-8 km, 1e-8 m/s."""
     density, height, ballistic = 1e-10, 45.0, (0.008, 0.02)
-    plant = PerturbedRelativeMotion(LEADER, e, 40.0, EARTH_J2, EARTH_RADIUS_KM, density, height, *ballistic)
+    plant = PerturbedRelativeMotion(at(40.0), e, 0.0, EARTH_J2, EARTH_RADIUS_KM, density, height, *ballistic)
 
     def acceleration(place: np.ndarray, speed: np.ndarray, b: float) -> np.ndarray:
         r = np.linalg.norm(place)
@@ -84,14 +92,14 @@ def test_nodal_period() -> None:
     """
     for inclination, argument in ((10.0, 0.0), (51.6, 40.0), (97.0, 120.0)):
         s, u = np.sin(np.radians(inclination)), np.radians(argument)
-        leader = Chief(A_KM, inclination, GM)
+        leader = Chief(A_KM, inclination, GM, argument_of_latitude_deg=argument)
         for j2 in (1e-5, 1e-4, EARTH_J2):
             k = j2 * (EARTH_RADIUS_KM / A_KM) ** 2
             mean = 1.0 / (1.0 - k * (3.0 * s**2 * np.sin(u) ** 2 - 1.5 * s**2))
             theory = TURN * mean**1.5 * (1.0 - 1.5 * k * (4.0 * (1.0 - s**2) - 1.0))
-            found = natural_period(PerturbedRelativeMotion(leader, 0.0, argument, j2))
+            found = natural_period(PerturbedRelativeMotion(leader, j2=j2))
             assert abs(found - theory) < 100.0 * k**2
-    assert natural_period(PerturbedRelativeMotion(LEADER, 0.1, 70.0, j2=0.0)) == pytest.approx(TURN, rel=1e-12)
+    assert natural_period(PerturbedRelativeMotion(at(70.0), 0.1, j2=0.0)) == pytest.approx(TURN, rel=1e-12)
 
 
 def test_drag_takes_energy_at_the_rate_of_a_circular_orbit() -> None:
@@ -106,7 +114,7 @@ def test_drag_takes_energy_at_the_rate_of_a_circular_orbit() -> None:
 
 def test_the_pole_keeps_its_direction() -> None:
     """Its angle to the orbit normal and its length stay, but for what J2 does in an orbit."""
-    plant = PerturbedRelativeMotion(LEADER, 0.01, 25.0)
+    plant = PerturbedRelativeMotion(at(25.0), 0.01)
     pole = plant.leader_motion(np.linspace(0.0, 10.0 * TURN, 60))[:, 3:]
     np.testing.assert_allclose(np.linalg.norm(pole, axis=1), 1.0, atol=1e-11)
     np.testing.assert_allclose(np.degrees(np.arccos(pole[:, 2])), 51.6, atol=0.1)
