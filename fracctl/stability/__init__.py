@@ -14,11 +14,13 @@ if TYPE_CHECKING:
     from fracctl.stability.families import FamilyMember, family, shoot_on_section
     from fracctl.stability.floquet import Neighbourhood, multipliers, nontrivial_multipliers, real_above_one, residual
     from fracctl.stability.lyapunov import largest_exponent
+    from fracctl.stability.modal_floquet import MemoryMultipliers, memory_multipliers
     from fracctl.stability.periodic_orbits import PeriodicOrbit, shoot
 
 __all__ = [
     "FamilyMember",
     "Margins",
+    "MemoryMultipliers",
     "Neighbourhood",
     "PeriodicOrbit",
     "PseudoStateVerdict",
@@ -28,6 +30,7 @@ __all__ = [
     "largest_exponent",
     "margins",
     "matignon",
+    "memory_multipliers",
     "multipliers",
     "noise_gain",
     "nontrivial_multipliers",
@@ -42,6 +45,8 @@ _ORBITS = {
     "Neighbourhood": "floquet",
     "family": "families",
     "shoot_on_section": "families",
+    "MemoryMultipliers": "modal_floquet",
+    "memory_multipliers": "modal_floquet",
     "PeriodicOrbit": "periodic_orbits",
     "shoot": "periodic_orbits",
     "largest_exponent": "lyapunov",

@@ -1,0 +1,122 @@
+"""Multipliers of periodic loops with memory against exact poles, integer-order monodromy, and flown growth."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import fracctl as fc
+from fracctl.controllers.linear import LinearLawTerms
+from fracctl.errors import ArgumentError, UnsupportedError
+from fracctl.fractional.terms import FractionalTerm
+from fracctl.plants import HCW, HCWOutOfPlane, LinearPlant, TschaunerHempel
+from fracctl.stability import memory_multipliers
+
+TURN = 2.0 * np.pi
+SLOW = fc.controllers.PDAlpha(k_p=0.5 * np.eye(3), k_d=0.3 * np.eye(3), alpha=0.6)
+"""Too weak for the radial direction: one real multiplier far outside."""
+FAST = fc.controllers.PDAlpha(
+    k_p=[[4.1, -1.55, 0.0], [3.15, 0.9, 0.0], [0.0, 0.0, 0.85]],
+    k_d=[[2.7, 1.05, 0.0], [0.9, 2.05, 0.0], [0.0, 0.0, 2.0]],
+    alpha=[0.98, 0.90, 0.91],
+)
+
+
+def errors(loop: fc.ClosedLoop, kernel_tolerance: float) -> np.ndarray:
+    """Relative distances of the multipliers of the exact poles to the nearest computed ones."""
+    exact = np.exp(TURN * fc.stability.assess(loop).poles)
+    found = memory_multipliers(loop, kernel_tolerance=kernel_tolerance).values
+    return np.abs(found - exact[:, None]).min(axis=1) / np.abs(exact)
+
+
+def test_on_a_circular_orbit_they_tend_to_those_of_the_exact_poles() -> None:
+    """IC1's fastest law out of plane, poles -1.116 ± 1.221i: the error falls with the number of modes.
+
+    kernel error   modes   relative error of the multiplier
+    1e-2           18      7.7e-2
+    1e-4           31      6.0e-3
+    1e-6           44      4.7e-4
+    1e-8           60      3.5e-5
+    """
+    loop = fc.ClosedLoop(HCWOutOfPlane(), fc.controllers.PDAlpha(k_p=0.85, k_d=2.0, alpha=0.91))
+    table = [errors(loop, tolerance).max() for tolerance in (1e-2, 1e-4, 1e-6, 1e-8)]
+    np.testing.assert_allclose(table, [7.7e-2, 6.0e-3, 4.7e-4, 3.5e-5], rtol=0.1)
+    found = memory_multipliers(loop, kernel_tolerance=1e-8)
+    assert found.stable
+    assert found.largest == pytest.approx(np.exp(-1.11552618 * TURN), rel=1e-4)
+    assert found.largest < found.slowest_relaxation < 1.0, "the tail, not the poles, is what settles last"
+    assert np.count_nonzero(found.isolated) == 2
+
+
+def test_poles_far_from_the_cut_are_there_with_few_modes() -> None:
+    loop = fc.ClosedLoop(HCW(), SLOW)
+    assert errors(loop, 1e-6).max() < 2e-6
+    found = memory_multipliers(loop)
+    assert not found.stable
+    assert found.largest == pytest.approx(np.exp(TURN * fc.stability.assess(loop).poles[0].real), rel=1e-7)
+
+
+@pytest.mark.parametrize("alpha", [1.0, 0.999999])
+def test_integer_orders_have_the_multipliers_of_the_monodromy_matrix(alpha: float) -> None:
+    """Of PD at e = 0.2, by an integrator; no modes are needed, and orders next to 1 are no limit."""
+    plant = TschaunerHempel(eccentricity=0.2, true_anomaly_deg=30.0)
+    law = fc.controllers.PDAlpha(k_p=FAST.k_p, k_d=0.1 * FAST.k_d, alpha=alpha)
+
+    def rates(t: float, y: np.ndarray) -> np.ndarray:
+        x = y.reshape(6, 6)
+        state, control = (part[0] for part in plant.jacobians(np.array([t]), np.zeros((1, 6)), np.zeros((1, 3))))
+        return (state @ x - control @ (law.k_p @ x[:3] + law.k_d @ x[3:])).ravel()
+
+    run = solve_ivp(rates, (0.0, TURN), np.eye(6).ravel(), "DOP853", rtol=1e-12, atol=1e-14)
+    expected = np.linalg.eigvals(run.y[:, -1].reshape(6, 6))
+    found = memory_multipliers(fc.ClosedLoop(plant, law))
+    assert found.modes == 0 or alpha < 1.0
+    distances = np.abs(found.values - expected[:, None]).min(axis=1)
+    assert distances.max() < (2e-7 if alpha == 1.0 else 1e-4)
+
+
+def test_a_growing_motion_grows_by_the_largest() -> None:
+    """At e = 0.1: from orbit to orbit the state of an unstable loop, flown by the memory solver, grows by μ."""
+    loop = fc.ClosedLoop(TschaunerHempel(eccentricity=0.1), SLOW)
+    found = memory_multipliers(loop)
+    flown = fc.solve(loop, [1e-3, 0, 0, 0, 0, 0], 4.0 * TURN, solver="explicit_memory", tolerance=1e-9)
+    places = flown(TURN * np.arange(2.0, 5.0))[:, 0]
+    assert not found.stable
+    assert places[2] / places[1] == pytest.approx(found.largest, rel=1e-5)
+
+
+def test_a_stable_loop_on_an_elliptic_orbit() -> None:
+    found = memory_multipliers(fc.ClosedLoop(TschaunerHempel(eccentricity=0.1), FAST))
+    assert found.stable
+    assert found.largest < 0.05
+    assert 0.99 < found.slowest_relaxation < 1.0
+
+
+def test_laws_with_integrals_and_lags() -> None:
+    """PI^λ D^μ and a lag: multipliers of the exact poles again."""
+    for law in (
+        fc.controllers.PILambdaDMu(k_p=0.8, k_i=0.4, k_d=0.5, integral_order=0.5, derivative_order=0.7),
+        fc.controllers.PDLag(k_p=0.8, k_d=0.5, time_constant=0.4),
+    ):
+        loop = fc.ClosedLoop(HCWOutOfPlane(), law)
+        exact = np.exp(TURN * fc.stability.assess(loop).poles[:2])
+        found = memory_multipliers(loop, kernel_tolerance=1e-10).values
+        assert (np.abs(found - exact[:, None]).min(axis=1) < 1e-4 * np.abs(exact)).all()
+
+
+def test_what_is_refused() -> None:
+    batch = fc.ClosedLoop(HCWOutOfPlane(), fc.controllers.PDAlpha(k_p=[0.1, 0.2], k_d=1.0, alpha=0.9))
+    with pytest.raises(ArgumentError, match="`loop` must be a single loop"):
+        memory_multipliers(batch)
+    timeless = fc.ClosedLoop(LinearPlant(-1.0), fc.controllers.PDAlpha(k_p=0.1, k_d=1.0, alpha=0.9))
+    with pytest.raises(ArgumentError, match="`period` must be a positive number, for the plant has none"):
+        memory_multipliers(timeless)
+    high = fc.ClosedLoop(HCWOutOfPlane(), _HighOrder())
+    with pytest.raises(UnsupportedError, match="orders up to 1 of positions"):
+        memory_multipliers(high)
+
+
+class _HighOrder:
+    def linear_terms(self, n_controls: int) -> LinearLawTerms:
+        return LinearLawTerms((FractionalTerm(-np.eye(n_controls), np.full(n_controls, 1.5)),))
