@@ -209,6 +209,13 @@ class Evaluation:
         arrays = {name: np.atleast_1d(np.asarray(value, dtype=np.float64)) for name, value in given.items()}
         return dict(zip(arrays, map(np.ascontiguousarray, np.broadcast_arrays(*arrays.values())), strict=True))
 
+    @cached_property
+    def _judged(self) -> tuple[str, ...]:
+        """Columns of trajectories that an unsettled one has infinite; measures may be told of where none minimises."""
+        minimised = set(itertools.chain.from_iterable(self.objectives.values()))
+        told = {c for m in self.measures if getattr(m, "may_be_infinite", False) for c in m.columns} - minimised
+        return tuple(column for measure in self.measures for column in measure.columns if column not in told)
+
     def _rows(self, trajectory: Trajectory, of_loop: Mapping[str, Floats]) -> dict[str, Array]:
         """Return measures, objectives, status and counters of one group of trajectories."""
         solved = np.isin(trajectory.status, ("ok", "failed"))
@@ -223,7 +230,7 @@ class Evaluation:
         rows["objective"] = means[self.objective]
         rows |= {f"objective_{name}": mean for name, mean in means.items()}
         status = trajectory.status.copy()
-        unsettled = np.logical_or.reduce([~np.isfinite(column) for column in values.values()])
+        unsettled = np.logical_or.reduce([~np.isfinite(values[name]) for name in self._judged])
         marginal = np.array([self.has_poles and verdict is None for verdict in trajectory.stable], dtype=bool)
         status[(status == "ok") & (unsettled | marginal)] = "unsettled"
         rows |= {"status": status, "stable": trajectory.stable, "error_estimate": trajectory.error_estimate}

@@ -50,3 +50,25 @@ class Scales:
     def period_s(self) -> float:
         """Seconds in 2π units of dimensionless time, one orbit of the chief."""
         return 2.0 * math.pi * self.time_s
+
+
+@dataclass(frozen=True)
+class Spacecraft:
+    """What flies, where masses and forces matter.
+
+    Raises:
+        ArgumentError: a number is not positive.
+    """
+
+    mass_kg: float | None = None
+    """At time 0; what is burnt is not taken off."""
+    thrust_n: float | None = None
+    """Largest thrust."""
+    isp_s: float | None = None
+    """Specific impulse."""
+
+    def __post_init__(self) -> None:
+        for name in ("mass_kg", "thrust_n", "isp_s"):
+            value = getattr(self, name)
+            if value is not None and not (math.isfinite(value) and value > 0.0):
+                raise ArgumentError(name, value, "must be a positive number")

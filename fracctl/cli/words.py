@@ -11,7 +11,8 @@ from typing import Any
 from fracctl.cli.table import count, number, table
 from fracctl.comparison import ComparisonEvaluation as ComparisonEvaluated
 from fracctl.config import registry
-from fracctl.config.schemas import ComparisonEvaluation, GridSurvey, RunConfig, SingleSurvey
+from fracctl.config.evaluations import ComparisonEvaluation
+from fracctl.config.schemas import GridSurvey, RunConfig, SingleSurvey
 from fracctl.evaluation import Evaluation
 from fracctl.plants import Chief, LinearPlant
 from fracctl.store.identity import run_id
@@ -26,6 +27,7 @@ def explain(config: RunConfig, evaluation: Evaluation, survey: Survey) -> list[s
     """Return the lines that explain a run."""
     rows = [
         *_plant(config, evaluation.plant),
+        *_spacecraft(config),
         *_law(config, evaluation),
         *_initial_conditions(evaluation),
         ("horizon", _time(evaluation.horizon, evaluation.plant.scales)),
@@ -43,8 +45,14 @@ def explain(config: RunConfig, evaluation: Evaluation, survey: Survey) -> list[s
 
 
 def _evaluated(config: RunConfig) -> str:
-    unlimited = getattr(config.evaluation, "largest_control", 0.0) is None
+    bounds = [getattr(config.evaluation, name, None) for name in ("largest_control", "largest_acceleration_mm_s2")]
+    unlimited = all(bound is None for bound in (*bounds, config.spacecraft.thrust_n))
     return _options(config.evaluation, hidden=("laws", "largest_by") if unlimited else ("laws",))
+
+
+def _spacecraft(config: RunConfig) -> Iterator[_Row]:
+    if text := _options(config.spacecraft):
+        yield "spacecraft", text
 
 
 def _plant(config: RunConfig, plant: LinearPlant) -> Iterator[_Row]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -10,15 +9,14 @@ import numpy as np
 from pydantic import ValidationError
 
 from fracctl.arrays import Floats
-from fracctl.config import registry
+from fracctl.config import flight, registry
+from fracctl.config.evaluations import AccuracyEvaluation, ComparisonEvaluation
+from fracctl.config.evaluations import DelayedEvaluation as DelayedOptions
+from fracctl.config.evaluations import MemoryEvaluation as MemoryOptions
 from fracctl.config.fields import lines_of, refuse
 from fracctl.config.messages import InvalidConfiguration, problems
 from fracctl.config.options import construct
-from fracctl.config.schemas import AccuracyEvaluation, ComparisonEvaluation, GridSurvey, RunConfig, SingleSurvey
-from fracctl.config.schemas import DelayedEvaluation as DelayedOptions
-from fracctl.config.schemas import MemoryEvaluation as MemoryOptions
-from fracctl.config.schemas import PerformanceEvaluation as PerformanceOptions
-from fracctl.controllers import Saturation
+from fracctl.config.schemas import GridSurvey, RunConfig, SingleSurvey
 from fracctl.dispersions import Distribution
 from fracctl.errors import ArgumentError, ConfigurationError
 from fracctl.evaluation import LAW_NUMBER, Evaluation
@@ -40,14 +38,18 @@ def build_evaluation(config: RunConfig) -> Evaluation:
         "parameters": build_parameters(config),
         "initial_conditions": build_initial_conditions(config, plant),
         "solver": construct(registry.load("solvers", config.solver.type), config.solver),
-        "horizon": 2.0 * math.pi * config.horizon_periods,
+        "horizon": flight.horizon(config, plant.scales),
     }
+    craft, limit_of_control = flight.spacecraft(config), flight.saturation(config, plant.scales)
     if isinstance(config.evaluation, AccuracyEvaluation):
         from fracctl import accuracy  # loads all solvers
 
         options = config.evaluation.model_dump(exclude={"type"})
         return accuracy.AccuracyEvaluation(**common, measures=(), objectives={}, objective="", **options)
-    made = [construct(registry.load("measures", name), options) for name, options in config.measures.items()]
+    made = [
+        flight.in_units(name, construct(registry.load("measures", name), options), plant, craft)
+        for name, options in config.measures.items()
+    ]
     measures: tuple[Any, ...] = tuple(measure for measure in made if not isinstance(measure, LoopMeasure))
     if isinstance(config.evaluation, ComparisonEvaluation):
         return _comparison(config, config.evaluation, common | {"measures": measures})
@@ -59,8 +61,7 @@ def build_evaluation(config: RunConfig) -> Evaluation:
     given = config.evaluation
     if isinstance(given, MemoryOptions):
         return _memory(given, config.seed, common)
-    if isinstance(given, DelayedOptions | PerformanceOptions) and given.largest_control is not None:
-        common["saturation"] = Saturation(given.largest_control, given.largest_by)
+    common["saturation"] = limit_of_control
     if isinstance(given, DelayedOptions):
         return _delayed(given, common)
     return Evaluation(
@@ -239,6 +240,8 @@ def build_initial_conditions(config: RunConfig, plant: LinearPlant) -> dict[str,
 
 
 def _state(given: Mapping[str, Any], plant: LinearPlant) -> Floats:
+    if given["units"] == "elements":
+        return flight.state_of_differences(given, plant)
     state = np.array([given[name] for name in plant.state_names], dtype=np.float64)
     if given["units"] == "si" and plant.scales is not None:
         m = len(plant.components)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, ValidationInfo, create_model
+from pydantic import AfterValidator, Field, ValidationInfo, create_model
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from fracctl.config import registry
@@ -20,6 +20,16 @@ from fracctl.surveys import axis_values
 
 LARGEST_GRID = 100_000_000
 """More points than this are taken for a mistyped step."""
+
+DIFFERENCES = (
+    "delta_a_km",
+    "delta_argument_of_latitude_deg",
+    "delta_inclination_deg",
+    "delta_q_1",
+    "delta_q_2",
+    "delta_raan_deg",
+)
+"""Keys of a start by orbit elements, in the order of `fracctl.elements`."""
 
 _HCW_STATES = ("u", "v", "w", "u_dot", "v_dot", "w_dot")
 
@@ -56,8 +66,12 @@ def initial_condition(value: Any, info: ValidationInfo) -> Strict:
     plant = plant_of(info.data)
     if plant is None:
         return Strict()
-    options = states_schema(state_keys(plant)).model_validate(plain(value))
+    by_elements = isinstance(plain(value), Mapping) and plain(value).get("units") == "elements"
+    schema = differences_schema() if by_elements else states_schema(state_keys(plant))
+    options = schema.model_validate(plain(value))
     given = options.model_dump()
+    if by_elements:
+        return _checked_differences(options, given, plant)
     if given["units"] == "si" and plant.scales is None:
         cure = "set plant.scales, or give" if type(plant) is LinearPlant else f"{type(plant).__name__} has none; give"
         raise refuse(refusal(("units",), "si", f"needs a plant with scales; {cure} dimensionless values"))
@@ -68,10 +82,28 @@ def initial_condition(value: Any, info: ValidationInfo) -> Strict:
     return options
 
 
+def _checked_differences(options: Strict, given: Mapping[str, Any], plant: Any) -> Strict:
+    if not hasattr(plant, "chief_elements"):
+        raise refuse(refusal(("units",), "elements", "needs a plant with a chief on an orbit; give its states"))
+    if not any(given[name] for name in DIFFERENCES):
+        still = f"nothing moves, for all differences are 0; set one of {', '.join(DIFFERENCES)}"
+        raise refuse(refusal((), given, still, "sentence"))
+    return options
+
+
+@cache
+def differences_schema() -> type[Strict]:
+    """The schema of a start by orbit elements; differences that are not given are 0."""
+    fields: dict[str, Any] = {"units": (Literal["elements"], "elements")}
+    fields |= dict.fromkeys(DIFFERENCES, (Number, 0.0))
+    fields["linearised"] = (Annotated[bool, Field(strict=True)], False)
+    return create_model("ElementDifferences", __base__=Strict, **fields)
+
+
 @cache
 def states_schema(names: tuple[str, ...]) -> type[Strict]:
     """The schema of an initial condition; states that are not given are 0."""
-    fields: dict[str, Any] = {"units": (Literal["dimensionless", "si"], "dimensionless")}
+    fields: dict[str, Any] = {"units": (Literal["dimensionless", "si", "elements"], "dimensionless")}
     fields |= dict.fromkeys(names, (Number, 0.0))
     return create_model("InitialCondition", __base__=Strict, **fields)
 

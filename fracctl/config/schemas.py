@@ -6,15 +6,25 @@ import re
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, Field, PlainValidator, SerializeAsAny, ValidationInfo
+from pydantic import AfterValidator, Field, PlainValidator, SerializeAsAny, ValidationInfo, model_validator
 from pydantic_core import InitErrorDetails
 
 from fracctl.config import parts
+from fracctl.config.evaluations import (
+    AccuracyEvaluation,
+    ComparisonEvaluation,
+    DelayedEvaluation,
+    MemoryEvaluation,
+    PerformanceEvaluation,
+    Positive,
+    SpacecraftOptions,
+)
 from fracctl.config.fields import Folder, Name, Number, Strict, Typed, Whole, refusal, refuse, unknown
-from fracctl.config.options import factory_of
-from fracctl.dispersions import Distribution
 from fracctl.errors import ArgumentError, suggestion
 from fracctl.measures.limits import limit
+
+HORIZONS = ("horizon_periods", "horizon_min", "horizon_s")
+"""Keys of the simulated time; one of them is given."""
 
 _COLUMN = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
@@ -35,121 +45,6 @@ class GridSurvey(Typed):
     """The design variable for each value of which an optimum is stored."""
     baseline: dict[str, Number] = Field(default_factory=dict)
     """Values that the point has with which the optimum is compared."""
-
-
-LargestControl = Annotated[Number, Field(gt=0.0)] | None
-
-
-class PerformanceEvaluation(Typed):
-    """Measures of trajectories, and objectives."""
-
-    type: Literal["performance"] = "performance"
-    largest_control: LargestControl = None
-    """What the thrusters can give, dimensionless; None for any."""
-    largest_by: Literal["norm", "axis"] = "norm"
-    """Whether that limits the magnitude or each component."""
-
-
-class AccuracyEvaluation(Typed):
-    """Errors and costs of the solvers."""
-
-    type: Literal["accuracy"]
-    contour: list[Number] = Field(default_factory=list)
-    """Tolerances."""
-    volterra: list[Whole] = Field(default_factory=list)
-    """Nodes on each panel."""
-    collocation: list[Whole] = Field(default_factory=list)
-    """Degrees of the polynomial."""
-    members: Annotated[Whole, Field(ge=1)] = 256
-    """Largest size of the batch that is timed."""
-    repeats: Annotated[Whole, Field(ge=1)] = 3
-    """How often it is timed."""
-
-
-class DelayedEvaluation(Typed):
-    """Runs under delayed feedback."""
-
-    type: Literal["delayed"]
-    delay_from: Literal["given", "period", "first_return"] = "given"
-    """Where τ comes from: `controller.delay`, the plant's own period, or the first return of the free motion."""
-    largest_control: LargestControl = None
-    """What the thrusters can give, dimensionless; None for any."""
-    largest_by: Literal["norm", "axis"] = "norm"
-    """Whether that limits the magnitude or each component."""
-
-
-class NamedLaw(Typed):
-    """A law among several."""
-
-    values: dict[str, Number] = Field(default_factory=dict)
-    """Values of its parameters; their defaults where none are given."""
-
-
-def _named_law(value: NamedLaw) -> NamedLaw:
-    factory_of("controllers", value.model_dump())
-    return value
-
-
-def _dispersions(value: dict[str, list[Any]]) -> dict[str, list[Any]]:
-    lines = []
-    for name, given in value.items():
-        try:
-            Distribution.of(given)
-        except ArgumentError as error:
-            lines.append(refusal((name,), given, error.allowed))
-    if lines:
-        raise refuse(*lines)
-    return value
-
-
-class MemoryEvaluation(Typed):
-    """Runs of laws with a memory in the loop."""
-
-    type: Literal["memory"]
-    laws: dict[str, Annotated[NamedLaw, AfterValidator(_named_law)]] = Field(default_factory=dict)
-    """Laws that are run one after the other, by the names they have in tables; none for `controller`."""
-    dispersions: Annotated[dict[str, list[Any]], AfterValidator(_dispersions)] = Field(default_factory=dict)
-    """Distributions by what is uncertain: ``[normal, mean, deviation]``, ``[uniform, from, to]``, ``[choice, …]``."""
-    samples: Annotated[Whole, Field(ge=1)] = 200
-    """How many are drawn where there are distributions."""
-    first_sample: Annotated[Whole, Field(ge=0)] = 0
-    """Number of the first."""
-
-
-class ComparedLaw(Typed):
-    """A law of a comparison."""
-
-    vary: tuple[str, ...] | None = None
-    """Parameters that are searched over; None for all."""
-    values: dict[str, Number] = Field(default_factory=dict)
-    """Values of the others; their defaults where none are given."""
-
-
-def _compared_law(value: ComparedLaw) -> ComparedLaw:
-    factory_of("controllers", value.model_dump())
-    return value
-
-
-class ComparisonEvaluation(Typed):
-    """Several laws on the same problems; goes with the survey of this name."""
-
-    type: Literal["comparison"]
-    laws: Annotated[dict[Name, Annotated[ComparedLaw, AfterValidator(_compared_law)]], Field(min_length=1)]
-    """`type` and options of each law."""
-    reference: str
-    """The law that others are compared with."""
-    thresholds_m: tuple[Number, ...]
-    """Settling bands in metres."""
-    gain_limits: tuple[Number, ...] = ()
-    """Largest gains."""
-    peak_limits_mm_per_s2: tuple[Number, ...] = ()
-    """Peak accelerations, with gains up to `widest_gain`."""
-    widest_gain: Number = 16.0
-    negative_gains: Annotated[bool, Field(strict=True)] = False
-    bounds: dict[str, tuple[Number, Number]] = Field(default_factory=dict)
-    """[lower, upper] of all varied orders, times and weights."""
-    report_periods: tuple[Number, ...] = (2.0, 6.0)
-    """Horizons at which the objective is given."""
 
 
 class SerialScheduler(Typed):
@@ -329,11 +224,27 @@ class RunConfig(Strict):
     """Where."""
     figures: Annotated[dict[Name, Figure], AfterValidator(_figures)] = Field(default_factory=dict)
     """By file name."""
-    horizon_periods: Annotated[Number, Field(gt=0.0)] = 6.0
+    spacecraft: SpacecraftOptions = SpacecraftOptions()
+    """Mass, thrust and specific impulse."""
+    horizon_periods: Positive = 6.0
     """Simulated time in units of 2π."""
+    horizon_min: Positive = None
+    """The same in minutes."""
+    horizon_s: Positive = None
+    """The same in seconds."""
     name: Name = "custom"
     """Folder of the runs in `output_dir`."""
     output_dir: Folder = "outputs"
     """Relative to the current directory."""
     seed: Annotated[Whole, Field(ge=0)] = 0
     """Of everything random."""
+
+    @model_validator(mode="after")
+    def _one_horizon(self) -> RunConfig:
+        given = [name for name in HORIZONS if getattr(self, name) is not None]
+        if len(given) != 1:
+            others = " and ".join(given) if given else "none"
+            cure = f"; set {' and '.join(f'{name}=null' for name in given[:-1])}" if given else ""
+            allowed = f"one of {', '.join(HORIZONS)} must be given, but {others} are{cure}"
+            raise refuse(refusal((given[-1] if given else HORIZONS[0],), None, allowed, "sentence"))
+        return self

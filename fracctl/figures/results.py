@@ -101,7 +101,12 @@ class Results:
     @property
     def horizon_periods(self) -> float:
         """Length of each trajectory in periods 2π."""
-        return float(self.configuration["horizon_periods"])
+        given = self.configuration
+        if given.get("horizon_periods") is not None:
+            return float(given["horizon_periods"])
+        assert self.scales is not None
+        seconds = given["horizon_s"] if given["horizon_min"] is None else 60.0 * given["horizon_min"]
+        return float(seconds) / self.scales.period_s
 
     @property
     def threshold(self) -> float | None:

@@ -87,7 +87,7 @@ def test_all_errors_come_at_once() -> None:
         ([*LINEAR, "initial_condition.own.units=si"],
          "initial_condition.own.units = si: needs a plant with scales; set plant.scales, or give dimensionless values"),
         (["initial_condition=own", "initial_condition.own.units=km", "initial_condition.own.w=1"],
-         "initial_condition.own.units = km: must be 'dimensionless' or 'si'"),
+         "initial_condition.own.units = km: must be 'dimensionless', 'si' or 'elements'"),
         (["initial_condition=own", "initial_condition.own.x=1"], ("unknown key 'initial_condition.own.x'; allowed: "
          "units, u, v, w, u_dot, v_dot, w_dot")),
         (["measures.settling_tim={}"], "unknown key 'measures.settling_tim'; did you mean 'measures.settling_time'?"),

@@ -1,0 +1,105 @@
+"""What an engineer gives in units: the simulated time, the bound of the thrusters, starts by orbit elements."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from fracctl.arrays import Floats
+from fracctl.config.evaluations import DelayedEvaluation, PerformanceEvaluation
+from fracctl.config.parts import DIFFERENCES
+from fracctl.config.schemas import HORIZONS, RunConfig
+from fracctl.controllers import Saturation
+from fracctl.elements import linearised_map, relative_state
+from fracctl.errors import ArgumentError, ConfigurationError
+from fracctl.units import Scales, Spacecraft
+
+_SECONDS = {"horizon_min": 60.0, "horizon_s": 1.0}
+
+
+def horizon(config: RunConfig, scales: Scales | None) -> float:
+    """Return the simulated time, dimensionless.
+
+    Raises:
+        ConfigurationError: it is given in a unit of time, and the plant has none.
+    """
+    (name,) = [name for name in HORIZONS if getattr(config, name) is not None]
+    value = float(getattr(config, name))
+    if name == "horizon_periods":
+        return 2.0 * math.pi * value
+    return value * _SECONDS[name] / _scales(scales, f"{name} = {value:g}", "horizon_periods").time_s
+
+
+def spacecraft(config: RunConfig) -> Spacecraft:
+    """Return what flies."""
+    return Spacecraft(**config.spacecraft.model_dump())
+
+
+def saturation(config: RunConfig, scales: Scales | None) -> Saturation | None:
+    """Return what the thrusters can give, None for any.
+
+    Raises:
+        ConfigurationError: there are two bounds, one in SI units for a plant without, a thrust without a mass, or one
+            that the evaluation does not take.
+    """
+    evaluation, craft = config.evaluation, config.spacecraft
+    bounds = {
+        "evaluation.largest_control": getattr(evaluation, "largest_control", None),
+        "evaluation.largest_acceleration_mm_s2": getattr(evaluation, "largest_acceleration_mm_s2", None),
+        "spacecraft.thrust_n": craft.thrust_n,
+    }
+    given = {name: value for name, value in bounds.items() if value is not None}
+    if not given:
+        return None
+    (name, value), *others = given.items()
+    if others:
+        raise ConfigurationError(f"{others[0][0]} = {others[0][1]:g}: a second bound beside {name}; keep one of them")
+    if not isinstance(evaluation, PerformanceEvaluation | DelayedEvaluation):
+        raise ConfigurationError(f"{name} = {value:g}: plays no part with evaluation.type = {evaluation.type}")
+    if name == "spacecraft.thrust_n":
+        if craft.mass_kg is None:
+            raise ConfigurationError(f"{name} = {value:g}: needs a mass; set spacecraft.mass_kg")
+        value /= craft.mass_kg
+    elif name.endswith("mm_s2"):
+        value *= 1e-3
+    if name != "evaluation.largest_control":
+        value /= _scales(scales, f"{name} = {given[name]:g}", "evaluation.largest_control").acceleration_m_s2
+    return Saturation(value, evaluation.largest_by)
+
+
+def in_units(name: str, measure: Any, plant: Any, craft: Spacecraft) -> Any:
+    """Return a measure that knows the plant's units and the spacecraft, where it needs them.
+
+    Raises:
+        ConfigurationError: it needs what they lack.
+    """
+    if not hasattr(measure, "for_flight"):
+        return measure
+    try:
+        return measure.for_flight(plant, craft)
+    except ArgumentError as error:
+        raise ConfigurationError(f"measures.{name}: {error.name} {error.allowed}") from error
+
+
+def state_of_differences(given: Mapping[str, Any], plant: Any) -> Floats:
+    """Return the dimensionless state that differences of orbit elements from the plant's chief are, (2m,)."""
+    degrees = math.pi / 180.0
+    units = [1e3 / plant.scales.length_m, degrees, degrees, 1.0, 1.0, degrees]
+    differences = np.array([given[name] for name in DIFFERENCES]) * units
+    chief = plant.chief_elements
+    if given["linearised"]:
+        state = linearised_map(chief) @ differences
+    else:
+        state = relative_state(chief, differences, getattr(plant, "frame_rate", None))
+    axes = ["uvw".find(name) if name in "uvw" else "xyz".index(name) for name in plant.components]
+    parts: Floats = state[[*axes, *(axis + 3 for axis in axes)]]
+    return parts
+
+
+def _scales(scales: Scales | None, what: str, instead: str) -> Scales:
+    if scales is None:
+        raise ConfigurationError(f"{what}: needs a plant with units; give {instead} instead")
+    return scales

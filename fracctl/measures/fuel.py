@@ -1,0 +1,95 @@
+"""What thrusters spend: ΔV of all components together, the peak of their acceleration, and propellant."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fracctl.arrays import Floats
+from fracctl.errors import ArgumentError
+from fracctl.measures.control_effort import ControlEffort
+from fracctl.measures.in_units import InUnits
+from fracctl.measures.peak_acceleration import PeakAcceleration
+from fracctl.panels import PanelGrid, interpolation
+from fracctl.trajectory import Trajectory
+from fracctl.units import STANDARD_GRAVITY_M_S2
+
+_MILLI = 1e3
+_PIECES = 4
+"""Parts between two nodes, each with Gauss's rule of five points."""
+
+
+class DeltaV(InUnits):
+    """ΔV in m/s up to the horizon, in- and out-of-plane together.
+
+    ``delta_v_m_s`` is Σ_i ∫ |υ_i| ds, for thrusters along the axes, the control effort of the paper times the unit of
+    speed; ``delta_v_3d_m_s`` is ∫ |υ| ds, for one engine that is turned. With one component they are the same.
+    """
+
+    name = "delta_v"
+    columns = ("delta_v_m_s", "delta_v_3d_m_s")
+
+    def __call__(self, trajectory: Trajectory) -> dict[str, Floats]:
+        """Return the columns, (b,) each."""
+        speed = self.scales.speed_m_s
+        by_axis = ControlEffort()(trajectory)[ControlEffort.name]
+        together = by_axis if trajectory.controls_at_nodes.shape[1] == 1 else magnitude_integral(trajectory)
+        return {"delta_v_m_s": speed * by_axis, "delta_v_3d_m_s": speed * together}
+
+
+def magnitude_integral(trajectory: Trajectory) -> Floats:
+    """Return ∫ |υ| ds over the horizon, (b,); +inf where there is no trajectory.
+
+    By Gauss's rule between the nodes. |υ| has a corner only where all components vanish at once.
+    """
+    grid, controls = trajectory.grid, trajectory.controls_at_nodes
+    first = np.linalg.norm(controls[:, :, 0], axis=1) * grid.panels[0].start
+    total = first + sum(_on_panel(grid, controls, i) for i in range(len(grid.panels)))
+    return np.where(trajectory.missing, np.inf, total)
+
+
+def _on_panel(grid: PanelGrid, controls: Floats, place: int) -> Floats:
+    where, panel, rule = list(grid.slices())[place]
+    points, weights = np.polynomial.legendre.leggauss(5)
+    edges = np.unique((rule.y[:-1, None] + np.diff(rule.y)[:, None] * np.linspace(0.0, 1.0, _PIECES + 1)).ravel())
+    half = 0.5 * np.diff(edges)
+    y = (0.5 * (edges[:-1] + edges[1:])[:, None] + half[:, None] * points).ravel()
+    values = controls[:, :, where] @ interpolation(rule.y, rule.weights, y).T
+    integral: Floats = np.linalg.norm(values, axis=1) @ ((half[:, None] * weights).ravel() * panel.rate(y))
+    return integral
+
+
+class PeakThrust(InUnits):
+    """The largest acceleration of one axis, in mm/s²; see `PeakAcceleration`."""
+
+    name = "peak_thrust"
+    columns = ("peak_acceleration_mm_s2",)
+
+    def __call__(self, trajectory: Trajectory) -> dict[str, Floats]:
+        """Return the column, (b,)."""
+        peak = PeakAcceleration()(trajectory)[PeakAcceleration.name]
+        return {self.columns[0]: _MILLI * self.scales.acceleration_m_s2 * peak}
+
+
+class Propellant(InUnits):
+    """Propellant in kg for the ΔV of thrusters along the axes, m (1 - exp(-ΔV/(g₀ I_sp))).
+
+    Mass and specific impulse are those of `spacecraft`.
+    """
+
+    name = "propellant"
+    columns = ("propellant_kg",)
+
+    def check(self) -> None:
+        """Raise ArgumentError unless everything is known."""
+        super().check()
+        for name in ("mass_kg", "isp_s"):
+            if getattr(self.spacecraft, name) is None:
+                raise ArgumentError(f"spacecraft.{name}", None, "must be given for this measure")
+
+    def __call__(self, trajectory: Trajectory) -> dict[str, Floats]:
+        """Return the column, (b,)."""
+        craft = self.spacecraft
+        assert craft.mass_kg is not None
+        assert craft.isp_s is not None
+        spent = ControlEffort()(trajectory)[ControlEffort.name] * self.scales.speed_m_s
+        return {self.columns[0]: -craft.mass_kg * np.expm1(-spent / (STANDARD_GRAVITY_M_S2 * craft.isp_s))}
