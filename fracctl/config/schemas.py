@@ -83,6 +83,9 @@ class Figure(Typed):
         "deployment",
         "settling_against_overshoot",
         "spread",
+        "approach",
+        "position_error",
+        "acceleration",
     ]
     objective: str | None = None
     """Whose optima are shown; None for the primary one."""

@@ -12,6 +12,8 @@ from matplotlib.figure import Figure
 
 from fracctl.errors import ConfigurationError, FracctlError, suggestion
 from fracctl.figures import (
+    acceleration,
+    approach,
     bode,
     deployment,
     drift,
@@ -24,6 +26,7 @@ from fracctl.figures import (
     order_contours,
     pareto_fronts,
     poles,
+    position_error,
     settling_against_band,
     settling_against_effort,
     settling_against_overshoot,
@@ -55,6 +58,9 @@ TYPES: Mapping[str, Callable[[Results, Selection], tuple[Figure, pd.DataFrame]]]
     "deployment": deployment.build,
     "settling_against_overshoot": settling_against_overshoot.build,
     "spread": spread.build,
+    "approach": approach.build,
+    "position_error": position_error.build,
+    "acceleration": acceleration.build,
 }
 """Type in the configuration to the function that makes the figure and the table behind it."""
 

@@ -69,6 +69,7 @@ COMPANIONS = {
     "plant=tether": ["experiment=libration", "initial_condition=own", "initial_condition.own.length=1"],
     "initial_condition=release_eccentric": ["experiment=tether_eccentric"],
     "controller=pd_alpha_full": ["plant=hcw"],
+    "controller=pd_alpha_published_full": ["plant=hcw"],
     "plant=tschauner_hempel": ["experiment=nonlinear_ic1"],
     "controller=pd_alpha_relative": ["experiment=nonlinear_ic1"],
     "initial_condition=ic1_relative": ["experiment=nonlinear_ic1"],
@@ -153,7 +154,14 @@ TETHERS = {
     "tether_station_keeping": ([], 3),
 }
 """Experiments with a memory in the loop: what makes them tiny, and their rows for each start."""
-FIXED = {"inplane_decoupled": 1, "inplane_lqr": 1, "inplane_published": 2, "nonlinear_ic1": 1}
+FIXED = {
+    "ic1_bands": 4,
+    "ic1_flight_plots": 1,
+    "inplane_decoupled": 1,
+    "inplane_lqr": 1,
+    "inplane_published": 2,
+    "nonlinear_ic1": 1,
+}
 """Experiments of so few design points that they need no budget, with their number."""
 
 

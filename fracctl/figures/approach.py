@@ -1,0 +1,110 @@
+"""The approach as a pilot sees it: V-bar and R-bar with equal axes, and the distance along the orbit normal."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+
+from fracctl.arrays import Floats
+from fracctl.figures import labels
+from fracctl.figures.curves import Curve, curves_of, table_of
+from fracctl.figures.flight import LINES, bands, metres
+from fracctl.figures.results import FigureError, Results, Selection
+from fracctl.figures.style import FULL_WIDTH_IN, GREY
+
+_ROW_HEIGHT_IN = 3.1
+_POINTS = 2000
+_TICK_MINUTES = (1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0, 120.0, 240.0, 480.0)
+_TICKS = 10
+"""At most this many time ticks along a path."""
+_RESTS = 1.0 / 50.0
+"""Of the largest distance: nearer to the target for good nothing more is seen."""
+
+
+def build(results: Results, selection: Selection) -> tuple[Figure, pd.DataFrame]:
+    """Draw a row for each initial condition: V-bar to the right, R-bar (nadir) down; H-bar against time at the right.
+
+    V-bar is y, R-bar -x and H-bar -z, against the orbit normal, so that the three form a right-handed frame. Ticks
+    along the paths are minutes; the square is the hold box of ±δ of the smallest band that can be seen.
+
+    Raises:
+        FigureError: the plant is not three-dimensional in the frame rtn, or has no units.
+    """
+    names = results.components
+    if len(names) != 3 or results.scales is None:
+        raise FigureError("an approach is drawn for plants with three components in the frame rtn and units; take hcw")
+    curves = {name: curves_of(results, selection, name) for name in selection.initial_conditions}
+    figure = Figure(figsize=(FULL_WIDTH_IN, _ROW_HEIGHT_IN * len(curves) + 0.3), layout="constrained")
+    axes = figure.subplots(len(curves), 2, squeeze=False, width_ratios=(1.3, 1.0))
+    for (name, pair), (plane, across) in zip(curves.items(), axes, strict=True):
+        unit, word = metres(results, pair, names)
+        end = max(_end(curve, names) for curve in pair)
+        _plane(plane, results, pair, (unit, word), end)
+        _across(across, results, pair, (unit, word), end)
+        plane.set_title(labels.initial_condition(name), loc="left")
+    handles, words = axes[0, 1].get_legend_handles_labels()
+    figure.legend(handles, words, loc="outside lower center", ncols=2)
+    return figure, table_of(curves)
+
+
+def _end(curve: Curve, names: Sequence[str]) -> float:
+    distance = np.linalg.norm([curve.samples[name].to_numpy(float) for name in names], axis=0)
+    late = np.flatnonzero(distance > _RESTS * distance.max())
+    return float(curve.times[late[-1]]) if late.size else float(curve.times[-1])
+
+
+def _plane(ax: Axes, results: Results, curves: Sequence[Curve], unit: tuple[float, str], end: float) -> None:
+    x, y, _ = results.components
+    assert results.scales is not None
+    minute = 60.0 / results.scales.time_s
+    step = next((tick for tick in _TICK_MINUTES if end / (tick * minute) <= _TICKS), _TICK_MINUTES[-1])
+    reach = 0.0
+    for curve in curves:
+        times = np.linspace(0.0, end, _POINTS)
+        along, down = curve.values(y, times) / unit[0], -curve.values(x, times) / unit[0]
+        reach = max(reach, float(np.hypot(np.ptp(along), np.ptp(down))))
+        ax.plot(along, down, **LINES[curve.kind])
+        _ticks(ax, curve, (x, y), step * minute * np.arange(1.0, end / (step * minute)), unit[0])
+        ax.plot(along[:1], down[:1], "o", color="black", markersize=3.0)
+    for band in bands(results):
+        half = band / unit[0]
+        if 0.02 * reach < half < 0.5 * reach:
+            ax.add_patch(Rectangle((-half, -half), 2.0 * half, 2.0 * half, fill=False, edgecolor=GREY, linewidth=0.8))
+            corner, text = (-half, half), f"±{band * results.scales.length_m:g} m"
+            ax.annotate(text, corner, (-2.0, -2.0), textcoords="offset points", ha="right", va="top", fontsize=7)
+            break
+    ax.plot(0.0, 0.0, marker="+", color="black", markersize=7.0)
+    ax.annotate(f"ticks: {step:g} min", (0.98, 0.03), xycoords="axes fraction", ha="right", fontsize=7, color=GREY)
+    ax.set_xlabel(rf"V-bar ($+{y}$, along-track) ({unit[1]})")
+    ax.set_ylabel(rf"R-bar ($-{x}$, nadir) ({unit[1]})")
+    ax.set_aspect("equal", adjustable="datalim")
+    ax.invert_yaxis()
+
+
+def _ticks(ax: Axes, curve: Curve, names: tuple[str, str], times: Floats, unit: float) -> None:
+    """Mark times by short strokes across the path."""
+    x, y = names
+    shift = 1e-3
+    places = np.stack([curve.values(y, times), -curve.values(x, times)]) / unit
+    later = np.stack([curve.values(y, times + shift), -curve.values(x, times + shift)]) / unit
+    for place, way in zip(places.T, (later - places).T, strict=True):
+        angle = math.degrees(math.atan2(-way[1], way[0]))
+        ax.plot(*place, marker=(2, 2, angle), color=LINES[curve.kind]["color"], markersize=7.0, linestyle="none")
+
+
+def _across(ax: Axes, results: Results, curves: Sequence[Curve], unit: tuple[float, str], end: float) -> None:
+    z = results.components[2]
+    times = np.linspace(0.0, end, _POINTS)
+    for curve in curves:
+        label = labels.controller(curve.best)
+        ax.plot(times / math.tau, -curve.values(z, times) / unit[0], label=label, **LINES[curve.kind])
+    ax.axhline(0.0, color=GREY, linewidth=0.5, zorder=0)
+    ax.set_xlabel(f"Time ({results.period_name})")
+    ax.set_ylabel(rf"H-bar ($-{z}$) ({unit[1]})")
+    ax.set_xlim(0.0, end / math.tau)
