@@ -137,6 +137,7 @@ def test_documents_name_targets_that_exist() -> None:
         "docs/implicit_memory.md",
         "docs/margins.md",
         "docs/sampled_law.md",
+        "docs/flight.md",
     ],
 )
 def test_documents_show_what_comes_out(name: str) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -76,8 +77,9 @@ def _plane(ax: Axes, results: Results, curves: Sequence[Curve], unit: tuple[floa
         half = band / unit[0]
         if 0.02 * reach < half < 0.5 * reach:
             ax.add_patch(Rectangle((-half, -half), 2.0 * half, 2.0 * half, fill=False, edgecolor=GREY, linewidth=0.8))
-            corner, text = (-half, half), f"±{band * results.scales.length_m:g} m"
-            ax.annotate(text, corner, (-2.0, -2.0), textcoords="offset points", ha="right", va="top", fontsize=7)
+            text = f"±{band * results.scales.length_m:g} m"
+            look: dict[str, Any] = {"ha": "center", "va": "top", "fontsize": 7, "color": GREY}
+            ax.annotate(text, (0.0, half), (0.0, -2.0), textcoords="offset points", **look)
             break
     ax.plot(0.0, 0.0, marker="+", color="black", markersize=7.0)
     ax.annotate(f"ticks: {step:g} min", (0.98, 0.03), xycoords="axes fraction", ha="right", fontsize=7, color=GREY)

@@ -37,7 +37,7 @@ def metres(results: Results, curves: Sequence[Curve], names: Sequence[str]) -> t
 
 def largest_acceleration(results: Results) -> float | None:
     """Return the bound of the thrusters, dimensionless, None where there is none."""
-    evaluation = results.configuration["evaluation"]
+    evaluation = results.configuration.get("evaluation") or {}
     craft = results.configuration.get("spacecraft") or {}
     if evaluation.get("largest_control") is not None:
         return float(evaluation["largest_control"])

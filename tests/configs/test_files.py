@@ -70,6 +70,7 @@ COMPANIONS = {
     "initial_condition=release_eccentric": ["experiment=tether_eccentric"],
     "controller=pd_alpha_full": ["plant=hcw"],
     "controller=pd_alpha_published_full": ["plant=hcw"],
+    "figures=approach": ["plant=hcw", "controller=pd_alpha_full"],
     "plant=tschauner_hempel": ["experiment=nonlinear_ic1"],
     "controller=pd_alpha_relative": ["experiment=nonlinear_ic1"],
     "initial_condition=ic1_relative": ["experiment=nonlinear_ic1"],
@@ -155,12 +156,14 @@ TETHERS = {
 }
 """Experiments with a memory in the loop: what makes them tiny, and their rows for each start."""
 FIXED = {
+    "elliptic_ic1": 1,
     "ic1_bands": 4,
     "ic1_flight_plots": 1,
     "inplane_decoupled": 1,
     "inplane_lqr": 1,
     "inplane_published": 2,
     "nonlinear_ic1": 1,
+    "perturbed_ic1": 1,
 }
 """Experiments of so few design points that they need no budget, with their number."""
 
