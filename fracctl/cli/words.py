@@ -82,7 +82,20 @@ def _law(config: RunConfig, evaluation: Evaluation) -> Iterator[_Row]:
     for equation in _equation(evaluation.law):
         yield "", equation
     yield "", ", ".join(f"{name} = {number(evaluation.parameters[name])}" for name in names)
+    yield from _derivative_gains(evaluation)
     yield from _delays(config, evaluation)
+
+
+def _derivative_gains(evaluation: Evaluation) -> Iterator[_Row]:
+    """Gains of fractional derivatives of single components in their odd unit, s^(α-2)."""
+    scales, values = evaluation.plant.scales, evaluation.parameters
+    if scales is None:
+        return
+    for component in evaluation.plant.components:
+        order, gain = values.get(f"alpha_{component}", 1.0), values.get(f"k_d_{component}")
+        if gain is not None and order < 1.0:
+            value = gain * scales.time_s ** (order - 2.0)
+            yield "", f"k_d_{component} is {number(value)} s^({number(order - 2.0)}) in SI units"
 
 
 def _delays(config: RunConfig, evaluation: Evaluation) -> Iterator[_Row]:

@@ -63,6 +63,7 @@ BUILT_IN: Mapping[str, Mapping[str, str]] = {
         "peak_acceleration": "fracctl.measures:PeakAcceleration",
         "settling_times": "fracctl.measures.settling_times:SettlingTimes",
         "delta_v": "fracctl.measures.fuel:DeltaV",
+        "station_keeping": "fracctl.measures.fuel:StationKeeping",
         "peak_thrust": "fracctl.measures.fuel:PeakThrust",
         "propellant": "fracctl.measures.fuel:Propellant",
         "overshoot_m": "fracctl.measures.overshoot_m:OvershootM",

@@ -149,3 +149,11 @@ def test_validate_a_run(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> N
     captured = capsys.readouterr()
     assert captured.out == ""
     assert "run.json" in captured.err
+
+
+def test_show_gives_fractional_gains_their_unit(capsys: pytest.CaptureFixture[str]) -> None:
+    """2 n^1.09 at n = 6.3135e-4 rad/s and α = 0.91; integer orders have none."""
+    assert main(["show", "controller.alpha_w=0.91"]) == 0
+    assert "k_d_w is 0.000650614 s^(-1.09) in SI units" in capsys.readouterr().out
+    assert main(["show"]) == 0
+    assert "SI units" not in capsys.readouterr().out

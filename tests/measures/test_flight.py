@@ -11,7 +11,7 @@ import fracctl as fc
 from fracctl.config.build import build_evaluation
 from fracctl.config.compose import compose
 from fracctl.errors import ArgumentError, ConfigurationError
-from fracctl.measures.fuel import DeltaV, PeakThrust, Propellant, magnitude_integral
+from fracctl.measures.fuel import DeltaV, PeakThrust, Propellant, StationKeeping, magnitude_integral
 from fracctl.measures.in_units import InUnits
 from fracctl.measures.open_loop_bound import OpenLoopBound
 from fracctl.measures.overshoot_m import OvershootM
@@ -95,6 +95,17 @@ def test_propellant_is_that_of_the_rocket_equation() -> None:
     assert 500.0 * math.log(500.0 / (500.0 - found)) == pytest.approx(500.0 * spent / (9.80665 * 220.0), rel=1e-12)
     with pytest.raises(ArgumentError, match=r"spacecraft.mass_kg"):
         Propellant().for_flight(PLANT)
+
+
+def test_station_keeping_is_the_last_orbit() -> None:
+    """An undamped loop, w = 0.001 sin 2s, controls by 3w for ever: ∫ over 2π is 12e-3; and the orbits add up to ΔV."""
+    loop = fc.ClosedLoop(PLANT, fc.controllers.PDAlpha(3.0, 0.0))
+    trajectory = fc.solve(loop, [0.0, 0.002], 20.0)
+    found = StationKeeping().for_flight(PLANT)(trajectory)["station_keeping_mm_s_per_orbit"]
+    assert found[0] == pytest.approx(1e3 * 12e-3 * PLANT.scales.speed_m_s, rel=1e-4)
+    whole, shorter = (DeltaV().for_flight(PLANT)(flown("pd_alpha", n))["delta_v_m_s"] for n in (4.0, 3.0))
+    last = StationKeeping().for_flight(PLANT)(flown("pd_alpha", 4.0))["station_keeping_mm_s_per_orbit"]
+    np.testing.assert_allclose(last, 1e3 * (whole - shorter), rtol=1e-4)
 
 
 def test_overshoot_in_metres_is_the_paper_s_without_its_scale() -> None:
