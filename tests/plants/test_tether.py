@@ -142,13 +142,15 @@ def test_forces_in_newton() -> None:
     assert ratio == pytest.approx((1.17 / 0.83) ** 4, rel=1e-12)
 
 
-def test_the_satellites_meet_where_the_tether_is_shortest() -> None:
-    plant = Tether(shortest=0.01)
-    (event,) = plant.events
-    x = np.zeros((2, 6))
-    x[:, 0] = 0.011, 0.009
-    assert (event.name, event.terminal) == ("collision", True)
-    np.testing.assert_array_equal(np.sign(event.function(np.zeros(2), x)), [1.0, -1.0])
+def test_runs_end_where_the_satellites_meet_and_where_there_is_no_more_tether() -> None:
+    plant = Tether(shortest=0.01, longest=1.5)
+    x = np.zeros((4, 6))
+    x[:, 0] = 0.009, 0.011, 1.49, 1.51
+    collision, escaped = plant.events
+    assert (collision.name, collision.terminal) == ("collision", True)
+    assert (escaped.name, escaped.terminal) == ("escaped", True)
+    np.testing.assert_array_equal(np.sign(collision.function(np.zeros(4), x)), [-1.0, 1.0, 1.0, 1.0])
+    np.testing.assert_array_equal(np.sign(escaped.function(np.zeros(4), x)), [1.0, 1.0, 1.0, -1.0])
 
 
 def test_limits_are_those_of_a_saturation_by_axis() -> None:
