@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fracctl.arrays import Array, Floats, finite
+from fracctl.controllers.delayed_feedback import DelayedLaw
 from fracctl.controllers.memory import MemoryLaw
 from fracctl.errors import ArgumentError, UnsupportedError
 from fracctl.fractional.sum_of_exponentials import sum_of_exponentials
@@ -82,7 +83,9 @@ class ImplicitMemory:
         """Return None for laws with a memory in the loop, otherwise why it is refused and what to use instead."""
         if not isinstance(loop.controller, MemoryLaw):
             law = "free motion" if loop.controller is None else type(loop.controller).__name__
-            return f"the {self.name} solver does not take {law}; use 'method_of_steps' or 'contour'"
+            delayed = loop.controller is None or isinstance(loop.controller, DelayedLaw)
+            instead = "method_of_steps" if delayed else "explicit_memory"
+            return f"the {self.name} solver does not take {law}; use '{instead}'"
         if getattr(loop.plant, "acceleration", None) is None:
             return f"the {self.name} solver needs a plant with a compiled acceleration, as Tether has"
         if loop.saturation is not None and loop.saturation.by != "axis":

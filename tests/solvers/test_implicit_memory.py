@@ -348,7 +348,7 @@ def test_meshes_grow_smoothly_and_end_at_the_horizon(first: float, step: float, 
 @pytest.mark.parametrize(
     ("loop", "sentence"),
     [
-        (ClosedLoop(Libration()), "does not take free motion; use 'method_of_steps' or 'contour'"),
+        (ClosedLoop(Libration()), "does not take free motion; use 'method_of_steps'"),
         (ClosedLoop(Libration(), DelayedFeedback(np.zeros((1, 2)), 1.0)), "does not take DelayedFeedback; use"),
         (ClosedLoop(FunctionPlant(lambda t, x, u: x, 2, 1), Law()), "needs a plant with a compiled acceleration"),
         (ClosedLoop(Cart(), Law(), Saturation(1.0, "norm")), "limits each control by itself; use a saturation by axis"),

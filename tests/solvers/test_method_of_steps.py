@@ -329,8 +329,8 @@ def test_laws_of_the_other_kind_are_refused_with_the_solver_to_use() -> None:
     fractional = ClosedLoop(HCWOutOfPlane(), PDAlpha(0.85, 2.0, 0.91))
     with pytest.raises(UnsupportedError, match="method_of_steps solver does not take PDAlpha; use 'contour'"):
         MethodOfSteps().solve(fractional, np.zeros(2), 1.0)
-    with pytest.raises(UnsupportedError, match="this one has a nonlinear plant and fractional terms"):
-        ClosedLoop(Libration(), PDAlpha(0.85, 2.0, 0.91))
+    with pytest.raises(UnsupportedError, match="method_of_steps solver does not take PDAlpha; use 'explicit_memory'"):
+        MethodOfSteps().solve(ClosedLoop(Libration(), PDAlpha(0.85, 2.0, 0.91)), np.zeros(2), 1.0)
     with pytest.raises(UnsupportedError, match="this one has delayed states; use 'method_of_steps'"):
         solve(ClosedLoop(HCWOutOfPlane(), DelayedFeedback(GAIN, 1.0)), np.zeros(2), 1.0)
     with pytest.raises(ArgumentError, match="did you mean 'method_of_steps'"):
