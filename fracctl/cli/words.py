@@ -11,7 +11,6 @@ from typing import Any
 from fracctl.cli.table import count, number, table
 from fracctl.comparison import ComparisonEvaluation as ComparisonEvaluated
 from fracctl.config import registry
-from fracctl.config.evaluations import ComparisonEvaluation
 from fracctl.config.schemas import GridSurvey, RunConfig, SingleSurvey
 from fracctl.evaluation import Evaluation
 from fracctl.plants import Chief, LinearPlant
@@ -21,6 +20,7 @@ from fracctl.surveys.base import SEARCHED_FOR
 from fracctl.units import Scales
 
 _Row = tuple[str, str]
+_DRAWN = ("dispersions", "samples", "first_sample")
 
 
 def explain(config: RunConfig, evaluation: Evaluation, survey: Survey) -> list[str]:
@@ -47,7 +47,9 @@ def explain(config: RunConfig, evaluation: Evaluation, survey: Survey) -> list[s
 def _evaluated(config: RunConfig) -> str:
     bounds = [getattr(config.evaluation, name, None) for name in ("largest_control", "largest_acceleration_mm_s2")]
     unlimited = all(bound is None for bound in (*bounds, config.spacecraft.thrust_n))
-    return _options(config.evaluation, hidden=("laws", "largest_by") if unlimited else ("laws",))
+    certain = not getattr(config.evaluation, "dispersions", None)
+    hidden = ["laws", *(["largest_by"] if unlimited else []), *(_DRAWN if certain else ())]
+    return _options(config.evaluation, hidden=hidden)
 
 
 def _spacecraft(config: RunConfig) -> Iterator[_Row]:
@@ -72,9 +74,10 @@ def _plant(config: RunConfig, plant: LinearPlant) -> Iterator[_Row]:
 
 
 def _law(config: RunConfig, evaluation: Evaluation) -> Iterator[_Row]:
-    if isinstance(config.evaluation, ComparisonEvaluation):
-        for place, (name, law) in enumerate(config.evaluation.laws.items()):
-            yield "" if place else "compares", _sentence(registry.load("controllers", law.type), name, "")
+    if laws := getattr(config.evaluation, "laws", None):
+        for place, (name, law) in enumerate(laws.items()):
+            values = ", ".join(f"{parameter} {number(value)}" for parameter, value in law.values.items())
+            yield "" if place else "compares", _sentence(registry.load("controllers", law.type), name, values)
         return
     decided = getattr(config.evaluation, "delay_from", "given") != "given"
     names = [name for name in evaluation.design_variables if not (decided and name == "delay")]

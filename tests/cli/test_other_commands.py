@@ -78,6 +78,14 @@ def test_show_speaks_in_units(capsys: pytest.CaptureFixture[str]) -> None:
         assert part in text
 
 
+@pytest.mark.parametrize("name", ["tether", "tether_monte_carlo", "tether_orders", "nonlinear_ic1", "ic1_bands"])
+def test_show_explains_every_kind_of_run(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    text = "\n".join(lines(capsys, "show", f"experiment={name}"))
+    assert text.startswith(name)
+    assert ("FDA-SMC, alpha_1 0.5, phi_2 0.0054" in text) is (name in ("tether", "tether_monte_carlo"))
+    assert ("samples 200" in text) is (name == "tether_monte_carlo")
+
+
 def test_show_says_what_a_search_does(capsys: pytest.CaptureFixture[str]) -> None:
     text = "\n".join(lines(capsys, "show", "experiment=ic1_inplane"))
     for part in (
