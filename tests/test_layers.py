@@ -12,6 +12,7 @@ PACKAGE = Path(__file__).parents[1] / "fracctl"
 
 BOTTOM_UP = (
     "errors",
+    "lazy",
     "units",
     "arrays",
     "elements",

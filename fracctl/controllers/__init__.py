@@ -5,8 +5,7 @@ Laws with compiled kernels are loaded at first use.
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from fracctl.controllers.adaptive_delay import AdaptiveDelayedFeedback
 from fracctl.controllers.delayed_feedback import DelayedFeedback, DelayedLaw, DelayedSum, DelayedTerm
@@ -21,6 +20,7 @@ from fracctl.controllers.pi_lambda_d_mu import PILambdaDMu
 from fracctl.controllers.pid import PID
 from fracctl.controllers.references import Approach
 from fracctl.controllers.saturation import Saturation
+from fracctl.lazy import loaded_at_first_use
 
 if TYPE_CHECKING:
     from fracctl.controllers.fractional_sliding_mode import FractionalSlidingMode
@@ -48,13 +48,10 @@ __all__ = [
     "Saturation",
 ]
 
-_COMPILED = {
-    "AdaptiveSlidingMode": "sliding_mode",
-    "FractionalSlidingMode": "fractional_sliding_mode",
-}
-
-
-def __getattr__(name: str) -> Any:
-    if name in _COMPILED:
-        return getattr(import_module(f"fracctl.controllers.{_COMPILED[name]}"), name)
-    raise AttributeError(f"module 'fracctl.controllers' has no attribute '{name}'")
+__getattr__ = loaded_at_first_use(
+    __name__,
+    {
+        "AdaptiveSlidingMode": "sliding_mode",
+        "FractionalSlidingMode": "fractional_sliding_mode",
+    },
+)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from fracctl.design.law import LQR
 from fracctl.design.lqr import gains_by_name, lqr
+from fracctl.lazy import loaded_at_first_use
 
 if TYPE_CHECKING:
     from fracctl.design.delayed_lqr import DelayedLQR
@@ -30,21 +30,17 @@ __all__ = [
     "periodic_regulator",
 ]
 
-_ORBITS = {
-    "first_return": "delays",
-    "natural_period": "delays",
-    "DelayedLQR": "delayed_lqr",
-    "ROTATIONS": "multiplier_minimisation",
-    "WindowedRegulator": "windowed_regulator",
-    "forward_blow_up": "state_regulators",
-    "lqr_at": "state_regulators",
-    "minimise_largest_multiplier": "multiplier_minimisation",
-    "periodic_regulator": "state_regulators",
-}
-"""Names that are loaded at first use, with compiled kernels."""
-
-
-def __getattr__(name: str) -> Any:
-    if name in _ORBITS:
-        return getattr(import_module(f"fracctl.design.{_ORBITS[name]}"), name)
-    raise AttributeError(f"module 'fracctl.design' has no attribute '{name}'")
+__getattr__ = loaded_at_first_use(
+    __name__,
+    {
+        "first_return": "delays",
+        "natural_period": "delays",
+        "DelayedLQR": "delayed_lqr",
+        "ROTATIONS": "multiplier_minimisation",
+        "WindowedRegulator": "windowed_regulator",
+        "forward_blow_up": "state_regulators",
+        "lqr_at": "state_regulators",
+        "minimise_largest_multiplier": "multiplier_minimisation",
+        "periodic_regulator": "state_regulators",
+    },
+)

@@ -5,9 +5,9 @@ Plants with compiled kernels are loaded at first use.
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from fracctl.lazy import loaded_at_first_use
 from fracctl.plants.function import FunctionPlant
 from fracctl.plants.hcw import HCW, Chief, HCWInPlane, HCWOutOfPlane
 from fracctl.plants.linear import LinearPlant
@@ -39,17 +39,14 @@ __all__ = [
     "TschaunerHempel",
 ]
 
-_COMPILED = {
-    "Libration": "libration",
-    "PerturbedRelativeMotion": "perturbed_relative_motion",
-    "RelativeMotion": "relative_motion",
-    "RotatingEllipsoid": "rotating_ellipsoid",
-    "Tether": "tether",
-    "TschaunerHempel": "tschauner_hempel",
-}
-
-
-def __getattr__(name: str) -> Any:
-    if name in _COMPILED:
-        return getattr(import_module(f"fracctl.plants.{_COMPILED[name]}"), name)
-    raise AttributeError(f"module 'fracctl.plants' has no attribute '{name}'")
+__getattr__ = loaded_at_first_use(
+    __name__,
+    {
+        "Libration": "libration",
+        "PerturbedRelativeMotion": "perturbed_relative_motion",
+        "RelativeMotion": "relative_motion",
+        "RotatingEllipsoid": "rotating_ellipsoid",
+        "Tether": "tether",
+        "TschaunerHempel": "tschauner_hempel",
+    },
+)

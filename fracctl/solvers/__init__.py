@@ -5,9 +5,9 @@ Their classes are loaded at first use.
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from fracctl.lazy import loaded_at_first_use
 from fracctl.solvers.base import Solver, Survey
 from fracctl.solvers.solve import solve
 
@@ -32,8 +32,14 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> Any:
-    if name in __all__:
-        module = "".join(f"_{c.lower()}" if c.isupper() else c for c in name).lstrip("_")
-        return getattr(import_module(f"fracctl.solvers.{module}"), name)
-    raise AttributeError(f"module 'fracctl.solvers' has no attribute '{name}'")
+__getattr__ = loaded_at_first_use(
+    __name__,
+    {
+        "Collocation": "collocation",
+        "Contour": "contour",
+        "ExplicitMemory": "explicit_memory",
+        "ImplicitMemory": "implicit_memory",
+        "MethodOfSteps": "method_of_steps",
+        "Volterra": "volterra",
+    },
+)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from fracctl.lazy import loaded_at_first_use
 from fracctl.stability.assess import Verdict, assess
 from fracctl.stability.margins import Margins, margins
 from fracctl.stability.matignon import PseudoStateVerdict, matignon
@@ -40,25 +40,21 @@ __all__ = [
     "shoot_on_section",
 ]
 
-_ORBITS = {
-    "FamilyMember": "families",
-    "Neighbourhood": "floquet",
-    "family": "families",
-    "shoot_on_section": "families",
-    "MemoryMultipliers": "modal_floquet",
-    "memory_multipliers": "modal_floquet",
-    "PeriodicOrbit": "periodic_orbits",
-    "shoot": "periodic_orbits",
-    "largest_exponent": "lyapunov",
-    "multipliers": "floquet",
-    "nontrivial_multipliers": "floquet",
-    "real_above_one": "floquet",
-    "residual": "floquet",
-}
-"""Names that are loaded at first use, with their compiled kernels."""
-
-
-def __getattr__(name: str) -> Any:
-    if name in _ORBITS:
-        return getattr(import_module(f"fracctl.stability.{_ORBITS[name]}"), name)
-    raise AttributeError(f"module 'fracctl.stability' has no attribute '{name}'")
+__getattr__ = loaded_at_first_use(
+    __name__,
+    {
+        "FamilyMember": "families",
+        "Neighbourhood": "floquet",
+        "family": "families",
+        "shoot_on_section": "families",
+        "MemoryMultipliers": "modal_floquet",
+        "memory_multipliers": "modal_floquet",
+        "PeriodicOrbit": "periodic_orbits",
+        "shoot": "periodic_orbits",
+        "largest_exponent": "lyapunov",
+        "multipliers": "floquet",
+        "nontrivial_multipliers": "floquet",
+        "real_above_one": "floquet",
+        "residual": "floquet",
+    },
+)
