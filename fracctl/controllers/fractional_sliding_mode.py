@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fracctl.arrays import Floats, batch_size, finite
+from fracctl.arrays import Floats, batch_size
 from fracctl.compiling import DEMAND, pointer_with
-from fracctl.controllers.layout import filled
+from fracctl.controllers.layout import filled, in_range
 from fracctl.controllers.memory import Reference
 from fracctl.controllers.parameters import Parameter
 from fracctl.controllers.references import Approach
 from fracctl.controllers.sliding_mode import REFERENCE_PARAMETERS, approach_of
-from fracctl.errors import ArgumentError, UnsupportedError
+from fracctl.errors import UnsupportedError
 from fracctl.plants.state import StatePlant
 
 
@@ -64,11 +64,8 @@ class FractionalSlidingMode:
         reference: Reference | None = None,
     ) -> None:
         given = (c_1, b_1, nu, c_2, kappa, k, eta, boundary_layer, caputo)
-        self._values = {p.name: finite(p.name, value) for p, value in zip(_PARAMETERS, given, strict=True)}
-        for parameter in _PARAMETERS:
-            for value in self._values[parameter.name].ravel():
-                if not parameter.contains(float(value)):
-                    raise ArgumentError(parameter.name, float(value), parameter.allowed)
+        names = [parameter.name for parameter in _PARAMETERS]
+        self._values = in_range(_PARAMETERS, dict(zip(names, given, strict=True)))
         self._reference = reference or Approach()
         wanted, _ = self._reference(np.zeros(1))
         self.batch = batch_size(**{name: (value, 0) for name, value in self._values.items()}, reference=(wanted, 2))

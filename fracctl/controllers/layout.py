@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from fracctl.arrays import Floats, finite
 from fracctl.controllers.parameters import Parameter, entry_names
+from fracctl.errors import ArgumentError
 
 
 def gain_parameters(prefix: str, components: Sequence[str]) -> list[Parameter]:
@@ -39,3 +40,17 @@ def gain_matrix(table: Mapping[str, Floats], prefix: str, components: Sequence[s
 def component_vector(table: Mapping[str, Floats], prefix: str, components: Sequence[str]) -> Floats:
     """Return one number a component, (m,) or (b, m)."""
     return np.stack(np.broadcast_arrays(*[table[f"{prefix}_{c}"] for c in components]), axis=-1)
+
+
+def in_range(parameters: Sequence[Parameter], given: Mapping[str, ArrayLike]) -> dict[str, Floats]:
+    """Return numbers or arrays (b,) by parameter name.
+
+    Raises:
+        ArgumentError: one lies outside its range.
+    """
+    values = {parameter.name: finite(parameter.name, given[parameter.name]) for parameter in parameters}
+    for parameter in parameters:
+        for value in values[parameter.name].ravel():
+            if not parameter.contains(float(value)):
+                raise ArgumentError(parameter.name, float(value), parameter.allowed)
+    return values

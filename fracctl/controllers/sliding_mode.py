@@ -13,7 +13,7 @@ from scipy.interpolate import CubicHermiteSpline
 from fracctl.arrays import Floats, batch_size, finite
 from fracctl.compiling import DEMAND, helper_with, pointer_with
 from fracctl.controllers.adaptation import NODES, adaptation_table, looked_up
-from fracctl.controllers.layout import component_vector, filled
+from fracctl.controllers.layout import component_vector, filled, in_range
 from fracctl.controllers.memory import Reference
 from fracctl.controllers.parameters import Parameter
 from fracctl.controllers.references import Approach
@@ -85,11 +85,7 @@ class AdaptiveSlidingMode:
             "vartheta_0": vartheta_0,
             "caputo": caputo,
         }
-        self._values = {name: finite(name, value) for name, value in given.items()}
-        for parameter in _PARAMETERS:
-            for value in self._values[parameter.name].ravel():
-                if not parameter.contains(float(value)):
-                    raise ArgumentError(parameter.name, float(value), parameter.allowed)
+        self._values = in_range(_PARAMETERS, given)
         self.gamma = finite("gamma", gamma)
         if self.gamma.ndim not in (1, 2) or (self.gamma < 0.0).any():
             raise ArgumentError("gamma", self.gamma.tolist(), "must hold numbers from 0 on, (m,) or (b, m)")

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fracctl.arrays import Array, Floats, finite
+from fracctl.arrays import Array, Floats
 from fracctl.controllers.delayed_feedback import DelayedLaw
 from fracctl.controllers.memory import MemoryLaw
 from fracctl.errors import ArgumentError, UnsupportedError
@@ -17,7 +17,7 @@ from fracctl.loop import ClosedLoop
 from fracctl.meshwise import MeshTrajectory
 from fracctl.plants.state import Event, StatePlant
 from fracctl.solvers.implicit_memory_kernel import BRACKETED, UNRESOLVED, march, room_for
-from fracctl.solvers.members import common_batch, positive
+from fracctl.solvers.members import positive, starting_states
 
 _GROWTH = 15.0
 """Share by which the first steps grow, over the largest step: 3 % for 2e-3, so that they are refined as the others."""
@@ -106,18 +106,14 @@ class ImplicitMemory:
         """
         if refusal := self.supports(loop):
             raise UnsupportedError(refusal)
-        given, n = finite("initial_state", initial_state), loop.plant.n_states
-        if given.ndim not in (1, 2) or given.shape[-1] != n:
-            raise ArgumentError("initial_state", f"of shape {given.shape}", f"must have shape ({n},) or (b, {n})")
-        batch = common_batch(loop.batch, len(given) if given.ndim == 2 else None)
-        start = np.array(np.broadcast_to(given, (batch, n)))
+        start, batched = starting_states(loop, initial_state)
         horizon = positive("horizon", horizon)
         problem = _Problem(loop, start, self.memory_tolerance)
         with np.errstate(all="ignore"):
             pilot = problem.on(graded_mesh(max(self.first_step, _FIRST), _PILOT * self.step, horizon))
             mesh = graded_mesh(self.first_step, self.step, horizon, _smooth(pilot))
             coarse, fine = problem.on(mesh), problem.on(halved(mesh))
-        return self._trajectory(loop, coarse, fine, loop.batch is not None or given.ndim == 2)
+        return self._trajectory(loop, coarse, fine, batched)
 
     def _trajectory(self, loop: ClosedLoop, coarse: _Run, fine: _Run, batched: bool) -> MeshTrajectory:
         end, events, ended = _ends(loop.plant, fine)

@@ -6,11 +6,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from fracctl.arrays import Array, Floats, finite
 from fracctl.errors import ArgumentError
 from fracctl.fractional.system import LinearFractionalSystem
 from fracctl.fractional.terms import FractionalTerm
+from fracctl.loop import ClosedLoop
 
 
 @dataclass(frozen=True)
@@ -80,6 +82,19 @@ def equal_orders(system: LinearFractionalSystem, fewest: int) -> Iterator[Array]
         yield np.flatnonzero(few)
     for value in np.flatnonzero(counts >= fewest):
         yield np.flatnonzero(which == value)
+
+
+def starting_states(loop: ClosedLoop, initial_state: ArrayLike) -> tuple[Floats, bool]:
+    """Return x(0) of all members of a loop with a plant in state form, (b, n), and whether there is a batch axis.
+
+    Raises:
+        ArgumentError: a shape does not fit.
+    """
+    given, n = finite("initial_state", initial_state), loop.plant.n_states
+    if given.ndim not in (1, 2) or given.shape[-1] != n:
+        raise ArgumentError("initial_state", f"of shape {given.shape}", f"must have shape ({n},) or (b, {n})")
+    batch = common_batch(loop.batch, len(given) if given.ndim == 2 else None)
+    return np.array(np.broadcast_to(given, (batch, n))), loop.batch is not None or given.ndim == 2
 
 
 def common_batch(loop: int | None, states: int | None) -> int:

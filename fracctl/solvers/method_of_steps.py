@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fracctl.arrays import Array, Booleans, Floats, finite
+from fracctl.arrays import Array, Booleans, Floats
 from fracctl.controllers.adaptive_delay import AdaptiveDelayedFeedback
 from fracctl.controllers.delayed_feedback import DelayedLaw, DelayedTerm
 from fracctl.errors import ArgumentError, UnsupportedError
 from fracctl.loop import ClosedLoop, Need
-from fracctl.solvers.members import common_batch, positive, whole
+from fracctl.solvers.members import positive, starting_states, whole
 from fracctl.solvers.method_of_steps_adaptive import AdaptiveRun
 from fracctl.solvers.method_of_steps_events import Watch
 from fracctl.solvers.method_of_steps_mesh import breaks_of, mesh_of
@@ -101,11 +101,7 @@ class MethodOfSteps:
         """
         if refusal := self.supports(loop):
             raise UnsupportedError(refusal)
-        given, n = finite("initial_state", initial_state), loop.plant.n_states
-        if given.ndim not in (1, 2) or given.shape[-1] != n:
-            raise ArgumentError("initial_state", f"of shape {given.shape}", f"must have shape ({n},) or (b, {n})")
-        batch = common_batch(loop.batch, len(given) if given.ndim == 2 else None)
-        start = np.array(np.broadcast_to(given, (batch, n)))
+        start, batched = starting_states(loop, initial_state)
         problem = _Problem(loop, start, positive("horizon", horizon), self.steps)
         with np.errstate(all="ignore"):
             steps, terms, watch, error = problem.solved()
@@ -123,7 +119,7 @@ class MethodOfSteps:
             status=problem.status(watch, error, self.tolerance),
             error_estimate=error,
             counters={"steps": np.array([np.searchsorted(e, last) for e, last in zip(steps.edges, end, strict=True)])},
-            batched=loop.batch is not None or given.ndim == 2,
+            batched=batched,
         )
 
 
