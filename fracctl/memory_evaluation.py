@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -39,6 +39,15 @@ class NamedLaw:
     """Values of its parameters; their defaults where none are given."""
 
 
+def check_laws(laws: Mapping[str, NamedLaw], components: Sequence[str]) -> None:
+    """Raise ArgumentError unless the values of laws name their parameters."""
+    for name, given in laws.items():
+        known = [parameter.name for parameter in given.law.parameters(components)]
+        for wrong in set(given.values) - set(known):
+            allowed = f"must name parameters of the law ({', '.join(known)}){suggestion(wrong, known)}"
+            raise ArgumentError(f"laws.{name}.values", wrong, allowed)
+
+
 @dataclass(frozen=True)
 class MemoryEvaluation(Evaluation):
     """How a design point becomes a row for each initial condition, for laws with a memory in the loop.
@@ -71,11 +80,7 @@ class MemoryEvaluation(Evaluation):
     def __post_init__(self) -> None:
         if not self.dispersed:
             super().__post_init__()
-        for name, given in self.laws.items():
-            known = [parameter.name for parameter in given.law.parameters(self.plant.components)]
-            for wrong in set(given.values) - set(known):
-                allowed = f"must name parameters of the law ({', '.join(known)}){suggestion(wrong, known)}"
-                raise ArgumentError(f"laws.{name}.values", wrong, allowed)
+        check_laws(self.laws, self.plant.components)
         states = [f"{_INITIAL}{name}" for name in self.plant.state_names]
         known = [*states, *getattr(self.plant, "dispersed", ())]
         for wrong in set(self.dispersions) - set(known):

@@ -37,6 +37,7 @@ BOTTOM_UP = (
     "evaluation",
     "delayed_evaluation",
     "memory_evaluation",
+    "flight",
     "accuracy",
     "surveys",
     "comparison",

@@ -36,6 +36,51 @@ def quantile_lines(records: Sequence[Record]) -> list[str]:
     return lines
 
 
+def survival_lines(records: Sequence[Record]) -> list[str]:
+    """Return a part for each start: a row for each law, the settling time of each stage, then what the last one shows.
+
+    Of stages with several flights stand the median and, in brackets, what 95 % of them keep.
+    """
+    lines = []
+    for condition in dict.fromkeys(record["initial_condition"] for record in records):
+        own = [record for record in records if record["initial_condition"] == condition]
+        stages = list(dict.fromkeys(record["stage"] for record in own))
+        title = f"{condition}, orbits to {own[0]['band_m']:g} m"
+        further = [name for name in _TAKEN if name in own[0]]
+        head = [title, *stages, *(_TAKEN[name] for name in further)]
+        rows = []
+        for law in dict.fromkeys(_who(record) for record in own):
+            of_law = {record["stage"]: record for record in own if _who(record) == law}
+            cells = [_settled(of_law[stage]) if stage in of_law else "" for stage in stages]
+            rows.append([law, *cells, *(_number(of_law[stages[-1]].get(name)) for name in further)])
+        lines += table([head, *rows])
+    return lines
+
+
+_TAKEN = {
+    "settled_percent": "% settled",
+    "median_delta_v_m_s": "ΔV, m/s",
+    "median_hold_error_m": "held, m",
+}
+"""What is told of the last stage besides, by the columns of the table."""
+
+
+def _who(record: Record) -> str:
+    """The law of a record, or the values that were varied."""
+    names = list(record)
+    design = [name for name in names[: names.index("stage")] if name != "initial_condition"]
+    return ", ".join(str(record[n]) if n == "law" else f"{n} = {_number(record[n])}" for n in design) or "the law"
+
+
+def _settled(record: Record) -> str:
+    median, most = (_time(record[name]) for name in ("median_orbits", "quantile_95_orbits"))
+    return median if record["samples"] == 1 or median == most else f"{median} ({most})"
+
+
+def _time(value: Any) -> str:
+    return "never" if value is None else f"{value:.3f}"
+
+
 def _group(record: Record) -> tuple[tuple[str, str], ...]:
     names = list(record)
     return tuple((name, _number(record[name])) for name in names[: names.index("measure")])

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from fracctl.cli import output
 from fracctl.cli.comparison import comparison_lines
 from fracctl.cli.failure import report, sentence
-from fracctl.cli.laws import law_lines, quantile_lines
+from fracctl.cli.laws import law_lines, quantile_lines, survival_lines
 from fracctl.cli.parser import Parser
 from fracctl.cli.table import ResultTable
 from fracctl.errors import ConfigurationError, FracctlError
@@ -165,6 +165,8 @@ def _lines(summary: dict[str, Any], config: RunConfig) -> list[str]:
         return comparison_lines(tables["comparison"], config.objectives[config.objective] == ["settling_time"])
     if "laws" in tables:
         return law_lines(tables["laws"])
+    if "survival" in tables:
+        return survival_lines(tables["survival"])
     if "quantiles" in tables:
         return quantile_lines(tables["quantiles"])
     return _table(config).lines(summary)

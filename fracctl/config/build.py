@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -12,12 +13,13 @@ from fracctl.arrays import Floats
 from fracctl.config import flight, registry
 from fracctl.config.evaluations import AccuracyEvaluation, ComparisonEvaluation
 from fracctl.config.evaluations import DelayedEvaluation as DelayedOptions
+from fracctl.config.evaluations import FlightEvaluation as FlightOptions
 from fracctl.config.evaluations import MemoryEvaluation as MemoryOptions
+from fracctl.config.evaluations import RobustEvaluation as RobustOptions
 from fracctl.config.fields import lines_of, refuse
 from fracctl.config.messages import InvalidConfiguration, problems
 from fracctl.config.options import construct
 from fracctl.config.schemas import GridSurvey, RunConfig, SingleSurvey
-from fracctl.dispersions import Distribution
 from fracctl.errors import ArgumentError, ConfigurationError
 from fracctl.evaluation import LAW_NUMBER, Evaluation
 from fracctl.measures.base import TRAJECTORIES, LoopMeasure, trajectories_of
@@ -26,6 +28,8 @@ from fracctl.plants import LinearPlant
 from fracctl.surveys import Grid, Single, Survey, axis_values
 
 _TRAJECTORIES = {"delayed": "StepwiseTrajectory", "memory": "MeshTrajectory"}
+_OF_LOOPS = ("performance", "robust")
+"""Evaluations that measure loops and keep to constraints."""
 _OWN_SOLVERS = {"delayed": "method_of_steps", "memory": "implicit_memory"}
 
 
@@ -61,14 +65,33 @@ def build_evaluation(config: RunConfig) -> Evaluation:
     given = config.evaluation
     if isinstance(given, MemoryOptions):
         return _memory(given, config.seed, common)
+    if isinstance(given, FlightOptions):
+        return _flight(config, given, common)
     common["saturation"] = limit_of_control
     if isinstance(given, DelayedOptions):
         return _delayed(given, common)
-    return Evaluation(
-        **common,
-        loop_measures=tuple(measure for measure in made if isinstance(measure, LoopMeasure)),
-        constraints={column: limit(text) for column, text in config.constraints.items()},
-    )
+    common["loop_measures"] = tuple(measure for measure in made if isinstance(measure, LoopMeasure))
+    common["constraints"] = {column: limit(text) for column, text in config.constraints.items()}
+    return _robust(given, config.seed, common) if isinstance(given, RobustOptions) else Evaluation(**common)
+
+
+def _robust(given: RobustOptions, seed: int, common: Mapping[str, Any]) -> Evaluation:
+    from fracctl.flight import RobustEvaluation
+
+    dispersions = flight.distributions(given)
+    options = given.model_dump(exclude={"type", "dispersions"})
+    try:
+        return RobustEvaluation(**common, dispersions=dispersions, seed=seed, **options)
+    except ArgumentError as error:
+        raise _refused(error) from error
+
+
+def _refused(error: ArgumentError) -> ConfigurationError:
+    """Return what an evaluation refuses under the key of the configuration."""
+    elsewhere = error.name.startswith(("measures", "plant", "solver"))
+    where = error.name if elsewhere else f"evaluation.{error.name}"
+    cure = f"; {error.instead}" if error.instead else ""
+    return ConfigurationError(f"{where} = {error.value}: {error.allowed}{cure}")
 
 
 def _delayed(given: DelayedOptions, common: Mapping[str, Any]) -> Evaluation:
@@ -82,16 +105,36 @@ def _delayed(given: DelayedOptions, common: Mapping[str, Any]) -> Evaluation:
 
 
 def _memory(given: MemoryOptions, seed: int, common: Mapping[str, Any]) -> Evaluation:
-    from fracctl.memory_evaluation import MemoryEvaluation, NamedLaw  # loads the solver
+    from fracctl.memory_evaluation import MemoryEvaluation  # loads the solver
 
-    laws = {name: NamedLaw(registry.load("controllers", law.type), law.values) for name, law in given.laws.items()}
-    dispersions = {name: Distribution.of(numbers) for name, numbers in given.dispersions.items()}
+    laws = _named_laws(given.laws)
+    dispersions = flight.distributions(given)
     options = {"laws": laws, "dispersions": dispersions, "samples": given.samples, "first_sample": given.first_sample}
     nothing: dict[str, Any] = {"objectives": {}, "objective": ""} if dispersions else {}
     try:
         return MemoryEvaluation(**{**common, **nothing}, **options, seed=seed)  # type: ignore[arg-type]
     except ArgumentError as error:
-        raise ConfigurationError(f"evaluation.{error.name} = {error.value}: {error.allowed}") from error
+        raise _refused(error) from error
+
+
+def _flight(config: RunConfig, given: FlightOptions, common: Mapping[str, Any]) -> Evaluation:
+    from fracctl.flight import FlightEvaluation, Sampling  # loads the sampled laws
+
+    plant, laws = common["plant"], _named_laws(given.laws)
+    options = {name: getattr(given, name) for name in ("stages", "band_m", "noise_samples", "samples", "first_sample")}
+    try:
+        sampling = Sampling(**{field.name: getattr(given, field.name) for field in fields(Sampling)})
+        around = flight.surroundings(config, given, plant)
+        free = {**common, "objectives": {}, "objective": ""}
+        return FlightEvaluation(**free, laws=laws, sampling=sampling, surroundings=around, seed=config.seed, **options)
+    except ArgumentError as error:
+        raise _refused(error) from error
+
+
+def _named_laws(given: Mapping[str, Any]) -> dict[str, Any]:
+    from fracctl.memory_evaluation import NamedLaw
+
+    return {name: NamedLaw(registry.load("controllers", law.type), law.values) for name, law in given.items()}
 
 
 def _comparison(config: RunConfig, given: ComparisonEvaluation, common: Mapping[str, Any]) -> Evaluation:
@@ -108,7 +151,7 @@ def _comparison(config: RunConfig, given: ComparisonEvaluation, common: Mapping[
             **common, objectives={}, objective="", factors=factors, laws=laws, **options
         )
     except ArgumentError as error:
-        raise ConfigurationError(f"evaluation.{error.name} = {error.value}: {error.allowed}") from error
+        raise _refused(error) from error
 
 
 def build_survey(config: RunConfig, evaluation: Evaluation) -> Survey:
@@ -125,8 +168,8 @@ def build_survey(config: RunConfig, evaluation: Evaluation) -> Survey:
         return Single({name: parameters[name] for name in evaluation.design_variables})
     if isinstance(survey, SingleSurvey | GridSurvey):
         grid = survey if isinstance(survey, GridSurvey) else GridSurvey(type="grid", axes={})
-        if grid.axes and isinstance(config.evaluation, MemoryOptions) and config.evaluation.laws:
-            cure = "survey one with evaluation=memory, whose law is the controller"
+        if grid.axes and getattr(config.evaluation, "laws", None):
+            cure = f"survey one with evaluation={config.evaluation.type}, whose law is the controller"
             raise ConfigurationError(f"survey.axes: several laws have their own values (evaluation.laws); {cure}")
         axes = {name: axis_values(spec, name) for name, spec in grid.axes.items()} | dict(evaluation.axes)
         fixed = {name: parameters[name] for name in evaluation.design_variables if name not in axes}
@@ -155,7 +198,7 @@ def build_checked(config: RunConfig) -> tuple[Evaluation, Survey]:
 def _check_loops(config: RunConfig, evaluation: Evaluation) -> None:
     """The loop of the controller, or of each of several laws, can be built and is one for the solver."""
     given = config.evaluation
-    laws = list(given.laws) if isinstance(given, MemoryOptions) else []
+    laws = list(given.laws) if isinstance(given, MemoryOptions | FlightOptions) else []
     for number, name in enumerate(laws or [""]):
         try:
             refused = evaluation.solver.supports(evaluation.loop({LAW_NUMBER: float(number)} if laws else {}))
@@ -187,10 +230,10 @@ def _check_measures(config: RunConfig) -> None:
             meant = f"is made for trajectories of {TRAJECTORIES[str(taken)]}, not of {TRAJECTORIES[wanted]}"
             raise ConfigurationError(f"measures.{name}: {meant}; choose others ('fracctl list measures')")
     kind = config.evaluation.type
-    for name in config.measures if kind != "performance" else ():
+    for name in config.measures if kind not in _OF_LOOPS else ():
         if hasattr(registry.load("measures", name), "of_loop"):
             raise ConfigurationError(f"measures.{name}: needs evaluation=performance, but evaluation.type = {kind}")
-    if config.constraints and kind != "performance":
+    if config.constraints and kind not in _OF_LOOPS:
         raise ConfigurationError(f"constraints: need evaluation=performance, but evaluation.type = {kind}")
     _check_controls(config)
 

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import inspect
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, Field, PlainValidator, SerializeAsAny
 
 from fracctl.config.fields import Name, Number, Strict, Typed, Whole, refusal, refuse
-from fracctl.config.options import factory_of
+from fracctl.config.options import construct, factory_of, typed_options_of
 from fracctl.dispersions import Distribution
 from fracctl.errors import ArgumentError
+from fracctl.flight.stages import STAGES
 
 Positive = Annotated[Number, Field(gt=0.0)] | None
 """A positive number, or nothing."""
+NotNegative = Annotated[Number, Field(ge=0.0)]
 
 
 class PerformanceEvaluation(Typed):
@@ -69,16 +72,22 @@ def _named_law(value: NamedLaw) -> NamedLaw:
     return value
 
 
-def _dispersions(value: dict[str, list[Any]]) -> dict[str, list[Any]]:
+def _dispersions(value: dict[str, list[Any] | None]) -> dict[str, list[Any] | None]:
+    """Check distributions; what is null is certain, so that an experiment can take away what another one has."""
+    given = {name: entry for name, entry in value.items() if entry is not None}
     lines = []
-    for name, given in value.items():
+    for name, entry in given.items():
         try:
-            Distribution.of(given)
+            Distribution.of(entry)
         except ArgumentError as error:
-            lines.append(refusal((name,), given, error.allowed))
+            lines.append(refusal((name,), entry, error.allowed))
     if lines:
         raise refuse(*lines)
-    return value
+    return dict(given)
+
+
+Dispersions = Annotated[dict[str, list[Any] | None], AfterValidator(_dispersions)]
+"""Distributions by name: ``[normal, mean, deviation]``, ``[uniform, lowest, highest]``, ``[choice, …]``, or null."""
 
 
 class MemoryEvaluation(Typed):
@@ -87,10 +96,92 @@ class MemoryEvaluation(Typed):
     type: Literal["memory"]
     laws: dict[str, Annotated[NamedLaw, AfterValidator(_named_law)]] = Field(default_factory=dict)
     """Laws that are run one after the other, by the names they have in tables; none for `controller`."""
-    dispersions: Annotated[dict[str, list[Any]], AfterValidator(_dispersions)] = Field(default_factory=dict)
+    dispersions: Dispersions = Field(default_factory=dict)
     """Distributions by what is uncertain: ``[normal, mean, deviation]``, ``[uniform, from, to]``, ``[choice, …]``."""
     samples: Annotated[Whole, Field(ge=1)] = 200
     """How many are drawn where there are distributions."""
+    first_sample: Annotated[Whole, Field(ge=0)] = 0
+    """Number of the first."""
+
+
+class RobustEvaluation(Typed):
+    """Design points judged over dispersed starts."""
+
+    type: Literal["robust"]
+    dispersions: Dispersions = Field(default_factory=dict)
+    """Distributions by what is added to a start: ``offset_w_m``, ``offset_w_dot_m_s``, ``offset_w_percent``, …"""
+    samples: Annotated[Whole, Field(ge=1)] = 50
+    """Starts about each initial condition."""
+    first_sample: Annotated[Whole, Field(ge=0)] = 0
+    """Number of the first."""
+    quantile: Annotated[Number, Field(gt=0.0, le=1.0)] = 0.95
+    """Share of the starts that are no worse than a row says."""
+
+
+class NavigationOptions(Strict):
+    """What is measured: white noise and biases on all axes, and how often."""
+
+    position_noise_m: NotNegative = 0.0
+    velocity_noise_m_s: NotNegative = 0.0
+    position_bias_m: Number = 0.0
+    velocity_bias_m_s: Number = 0.0
+    every: Annotated[Whole, Field(ge=1)] = 1
+    """Measurements come every so many periods and are held in between."""
+
+
+class ThrusterOptions(Strict):
+    """What becomes of small demands; the bound is `largest_control` or `spacecraft.thrust_n`."""
+
+    deadband_mm_s2: NotNegative = 0.0
+    impulse_bit_n_s: NotNegative = 0.0
+    """Smallest impulse, for a spacecraft of `spacecraft.mass_kg`."""
+
+
+def _truth(value: Any) -> Typed | None:
+    if value is None:
+        return None
+    given = value.model_dump() if isinstance(value, Typed) else value
+    factory = factory_of("plants", given)
+    if "leader" not in inspect.signature(factory).parameters:
+        allowed = "must be motion about a leader (relative_motion, perturbed_relative_motion, tschauner_hempel)"
+        raise refuse(refusal(("type",), given["type"], allowed))
+    options = typed_options_of(factory, omitted=("leader",)).model_validate(given)
+    construct(factory, options)
+    return options
+
+
+class FlightEvaluation(Typed):
+    """Flights of laws through stages that come nearer to the truth."""
+
+    type: Literal["flight"]
+    laws: dict[str, Annotated[NamedLaw, AfterValidator(_named_law)]] = Field(default_factory=dict)
+    """Laws that are flown one after the other, by the names they have in tables; none for `controller`."""
+    stages: Annotated[tuple[str, ...], Field(min_length=1)] = STAGES
+    band_m: Annotated[Number, Field(gt=0.0)] | dict[str, Annotated[Number, Field(gt=0.0)]] = 100.0
+    """The settling band by which flights are judged, one for all starts or by their names."""
+    period_s: Annotated[Number, Field(gt=0.0)] = 10.0
+    delay: NotNegative = 0.0
+    feed: Literal["position", "velocity"] = "velocity"
+    memory: Literal["window", "oustaloup", "exponentials"] = "exponentials"
+    memory_tolerance: Annotated[Number, Field(gt=0.0, lt=1.0)] = 0.01
+    memory_samples: Annotated[Whole, Field(ge=2)] | None = None
+    anti_windup: Literal["none", "hold_integrals", "restart"] = "none"
+    navigation: NavigationOptions = NavigationOptions()
+    thrusters: ThrusterOptions = ThrusterOptions()
+    largest_control: Positive = None
+    """What the thrusters can give, dimensionless; None for any."""
+    largest_acceleration_mm_s2: Positive = None
+    """The same in mm/s²."""
+    largest_by: Literal["norm", "axis"] = "axis"
+    """Whether that limits the magnitude or each component."""
+    truth: Annotated[SerializeAsAny[Typed] | None, PlainValidator(_truth)] = None
+    """Motion from the stage ``nonlinear`` on, a plant about the chief as its leader; None for that of the design."""
+    dispersions: Dispersions = Field(default_factory=dict)
+    """Distributions by what is uncertain in the stage ``dispersed``."""
+    noise_samples: Annotated[Whole, Field(ge=1)] = 50
+    """Flights of the stages ``noisy`` and ``nonlinear``."""
+    samples: Annotated[Whole, Field(ge=1)] = 500
+    """Flights of the stage ``dispersed``."""
     first_sample: Annotated[Whole, Field(ge=0)] = 0
     """Number of the first."""
 

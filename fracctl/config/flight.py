@@ -9,12 +9,24 @@ from typing import Any
 import numpy as np
 
 from fracctl.arrays import Floats
-from fracctl.config.evaluations import DelayedEvaluation, PerformanceEvaluation
+from fracctl.config import registry
+from fracctl.config.evaluations import (
+    DelayedEvaluation,
+    FlightEvaluation,
+    MemoryEvaluation,
+    PerformanceEvaluation,
+    RobustEvaluation,
+)
+from fracctl.config.options import construct
 from fracctl.config.parts import DIFFERENCES
 from fracctl.config.schemas import HORIZONS, RunConfig
 from fracctl.controllers import Saturation
+from fracctl.dispersions import Distribution
 from fracctl.elements import linearised_map, relative_state
 from fracctl.errors import ArgumentError, ConfigurationError
+from fracctl.flight import Surroundings
+from fracctl.plants import Chief
+from fracctl.sampled import Actuator, Navigation
 from fracctl.units import Scales, Spacecraft
 
 _SECONDS = {"horizon_min": 60.0, "horizon_s": 1.0}
@@ -57,7 +69,7 @@ def saturation(config: RunConfig, scales: Scales | None) -> Saturation | None:
     (name, value), *others = given.items()
     if others:
         raise ConfigurationError(f"{others[0][0]} = {others[0][1]:g}: a second bound beside {name}; keep one of them")
-    if not isinstance(evaluation, PerformanceEvaluation | DelayedEvaluation):
+    if not isinstance(evaluation, PerformanceEvaluation | DelayedEvaluation | FlightEvaluation):
         raise ConfigurationError(f"{name} = {value:g}: plays no part with evaluation.type = {evaluation.type}")
     if name == "spacecraft.thrust_n":
         if craft.mass_kg is None:
@@ -68,6 +80,54 @@ def saturation(config: RunConfig, scales: Scales | None) -> Saturation | None:
     if name != "evaluation.largest_control":
         value /= _scales(scales, f"{name} = {given[name]:g}", "evaluation.largest_control").acceleration_m_s2
     return Saturation(value, evaluation.largest_by)
+
+
+def surroundings(config: RunConfig, given: FlightEvaluation, plant: Any) -> Surroundings:
+    """Return what flights of a plant with units meet.
+
+    Raises:
+        ConfigurationError: an impulse bit comes without a mass.
+        ArgumentError: a dispersion or the true plant does not fit.
+    """
+    scales, craft, thrusters = plant.scales, spacecraft(config), given.thrusters
+    if scales is None:
+        raise ArgumentError("plant", plant, "must have units for flights; set plant.scales")
+    if thrusters.impulse_bit_n_s and craft.mass_kg is None:
+        where = f"evaluation.thrusters.impulse_bit_n_s = {thrusters.impulse_bit_n_s:g}"
+        raise ConfigurationError(f"{where}: needs a mass; set spacecraft.mass_kg")
+    navigation = given.navigation
+    return Surroundings(
+        plant,
+        None if given.truth is None else _truth(given, plant),
+        Actuator(
+            saturation(config, scales),
+            1e-3 * thrusters.deadband_mm_s2 / scales.acceleration_m_s2,
+            thrusters.impulse_bit_n_s / (craft.mass_kg or 1.0) / scales.speed_m_s,
+        ),
+        Navigation(
+            navigation.position_noise_m / scales.length_m,
+            navigation.velocity_noise_m_s / scales.speed_m_s,
+            navigation.position_bias_m / scales.length_m,
+            navigation.velocity_bias_m_s / scales.speed_m_s,
+            navigation.every,
+        ),
+        craft,
+        distributions(given),
+        config.seed,
+    )
+
+
+def distributions(given: FlightEvaluation | MemoryEvaluation | RobustEvaluation) -> dict[str, Distribution]:
+    """Return what is uncertain, by name."""
+    return {name: Distribution.of(numbers) for name, numbers in given.dispersions.items() if numbers is not None}
+
+
+def _truth(given: FlightEvaluation, plant: Any) -> Any:
+    assert given.truth is not None
+    if not isinstance(getattr(plant, "chief", None), Chief):
+        cure = "take plant=hcw, or leave truth null"
+        raise ConfigurationError(f"evaluation.truth.type = {given.truth.type}: needs a chief on an orbit; {cure}")
+    return construct(registry.load("plants", given.truth.type), given.truth, leader=plant.chief)
 
 
 def in_units(name: str, measure: Any, plant: Any, craft: Spacecraft) -> Any:

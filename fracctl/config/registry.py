@@ -66,6 +66,7 @@ BUILT_IN: Mapping[str, Mapping[str, str]] = {
         "station_keeping": "fracctl.measures.fuel:StationKeeping",
         "peak_thrust": "fracctl.measures.fuel:PeakThrust",
         "propellant": "fracctl.measures.fuel:Propellant",
+        "hold_error": "fracctl.measures.hold_error:HoldError",
         "overshoot_m": "fracctl.measures.overshoot_m:OvershootM",
         "open_loop_bound": "fracctl.measures.open_loop_bound:OpenLoopBound",
         "periodicity_error": "fracctl.measures:PeriodicityError",

@@ -14,9 +14,11 @@ from fracctl.config.evaluations import (
     AccuracyEvaluation,
     ComparisonEvaluation,
     DelayedEvaluation,
+    FlightEvaluation,
     MemoryEvaluation,
     PerformanceEvaluation,
     Positive,
+    RobustEvaluation,
     SpacecraftOptions,
 )
 from fracctl.config.fields import Folder, Name, Number, Strict, Typed, Whole, refusal, refuse, unknown
@@ -83,6 +85,7 @@ class Figure(Typed):
         "deployment",
         "settling_against_overshoot",
         "spread",
+        "survival",
         "approach",
         "position_error",
         "acceleration",
@@ -102,6 +105,8 @@ EVALUATIONS: Mapping[str, type[Typed]] = {
     "comparison": ComparisonEvaluation,
     "delayed": DelayedEvaluation,
     "memory": MemoryEvaluation,
+    "robust": RobustEvaluation,
+    "flight": FlightEvaluation,
 }
 SCHEDULERS: Mapping[str, type[Typed]] = {"serial": SerialScheduler, "local": LocalScheduler}
 

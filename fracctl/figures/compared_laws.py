@@ -19,6 +19,8 @@ BOUND: dict[str, Any] = {"color": GREY, "linewidth": 0.9, "linestyle": (0, (4, 2
 
 _MARKERS = ("o", "D", "s", "^", "v", "P")
 _WORDS = {"pd": "PD", "pd_alpha": r"PD$^{\alpha}$", "pd_lag": "PD with lag", "pid": "PID", "lqr": "LQR"} | {
+    "published_pd": "PD, published",
+    "published_pd_alpha": r"PD$^{\alpha}$, published",
     "pdd_alpha": r"PDD$^{\alpha}$",
     "pi_lambda_d_mu": r"PI$^{\lambda}$D$^{\mu}$",
 }

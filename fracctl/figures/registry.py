@@ -31,6 +31,7 @@ from fracctl.figures import (
     settling_against_effort,
     settling_against_overshoot,
     spread,
+    survival,
     trajectories,
     work_precision,
 )
@@ -58,6 +59,7 @@ TYPES: Mapping[str, Callable[[Results, Selection], tuple[Figure, pd.DataFrame]]]
     "deployment": deployment.build,
     "settling_against_overshoot": settling_against_overshoot.build,
     "spread": spread.build,
+    "survival": survival.build,
     "approach": approach.build,
     "position_error": position_error.build,
     "acceleration": acceleration.build,

@@ -7,14 +7,13 @@ import numpy as np
 from fracctl.arrays import Floats
 from fracctl.errors import ArgumentError
 from fracctl.measures.control_effort import ControlEffort
-from fracctl.measures.in_units import TURN, InUnits
+from fracctl.measures.in_units import TURN, InUnits, last_orbit
 from fracctl.measures.peak_acceleration import PeakAcceleration
 from fracctl.panels import PanelGrid, interpolation
 from fracctl.trajectory import Trajectory
-from fracctl.units import STANDARD_GRAVITY_M_S2
+from fracctl.units import STANDARD_GRAVITY_M_S2, Spacecraft
 
 _MILLI = 1e3
-_INTERVALS = 400
 _PIECES = 4
 """Parts between two nodes, each with Gauss's rule of five points."""
 
@@ -72,13 +71,9 @@ class StationKeeping(InUnits):
     def __call__(self, trajectory: Trajectory) -> dict[str, Floats]:
         """Return the column, (b,)."""
         grid = trajectory.grid
-        start = max(grid.horizon - TURN, 0.0)
-        edges = np.linspace(start, grid.horizon, _INTERVALS + 1)
-        half = 0.5 * np.diff(edges)
-        points, weights = np.polynomial.legendre.leggauss(5)
-        times = (0.5 * (edges[:-1] + edges[1:])[:, None] + half[:, None] * points).ravel()
-        spent = np.abs(grid.evaluate(trajectory.controls_at_nodes, times)).sum(axis=1) @ np.outer(half, weights).ravel()
-        per_orbit = spent * TURN / (grid.horizon - start)
+        times, weights = last_orbit(grid.horizon)
+        spent = np.abs(grid.evaluate(trajectory.controls_at_nodes, times)).sum(axis=1) @ weights
+        per_orbit = spent * TURN / weights.sum()
         return {self.columns[0]: np.where(trajectory.missing, np.inf, _MILLI * self.scales.speed_m_s * per_orbit)}
 
 
@@ -112,8 +107,12 @@ class Propellant(InUnits):
 
     def __call__(self, trajectory: Trajectory) -> dict[str, Floats]:
         """Return the column, (b,)."""
-        craft = self.spacecraft
-        assert craft.mass_kg is not None
-        assert craft.isp_s is not None
         spent = ControlEffort()(trajectory)[ControlEffort.name] * self.scales.speed_m_s
-        return {self.columns[0]: -craft.mass_kg * np.expm1(-spent / (STANDARD_GRAVITY_M_S2 * craft.isp_s))}
+        return {self.columns[0]: propellant_kg(self.spacecraft, spent)}
+
+
+def propellant_kg(craft: Spacecraft, delta_v_m_s: Floats) -> Floats:
+    """Return m (1 - exp(-ΔV/(g₀ I_sp))) for ΔV (b,), (b,)."""
+    assert craft.mass_kg is not None
+    assert craft.isp_s is not None
+    return np.asarray(-craft.mass_kg * np.expm1(-delta_v_m_s / (STANDARD_GRAVITY_M_S2 * craft.isp_s)))

@@ -9,6 +9,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from fracctl.arrays import Floats
 from fracctl.errors import ArgumentError
 from fracctl.plants.linear import LinearPlant
 from fracctl.plants.state import StatePlant
@@ -62,3 +63,16 @@ def checked_bands(thresholds_m: Sequence[float]) -> tuple[float, ...]:
 
 
 TURN = 2.0 * np.pi
+_INTERVALS = 400
+
+
+def last_orbit(horizon: float) -> tuple[Floats, Floats]:
+    """Return times in the last 2π before the horizon, or in all of it if that is shorter, and their weights.
+
+    Of an integral by Gauss's rule with five points on each of 400 intervals, (2000,) each.
+    """
+    edges = np.linspace(max(horizon - TURN, 0.0), horizon, _INTERVALS + 1)
+    half = 0.5 * np.diff(edges)
+    points, weights = np.polynomial.legendre.leggauss(5)
+    times = (0.5 * (edges[:-1] + edges[1:])[:, None] + half[:, None] * points).ravel()
+    return times, np.outer(half, weights).ravel()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from fracctl.arrays import Floats
 from fracctl.measures.in_units import TURN, InUnits, checked_bands
@@ -33,11 +33,14 @@ class SettlingTimes(InUnits):
 
     def __call__(self, trajectory: Trajectory) -> dict[str, Floats]:
         """Return the columns, (b,) each."""
-        scales = self.scales
-        bands = {column_of(band): SettlingTime(band / scales.length_m) for band in self.thresholds_m}
-        times = {column: measure(trajectory)[measure.name] for column, measure in bands.items()}
-        minutes = {f"{column}_min": scales.time_s / 60.0 * time for column, time in times.items()}
-        return times | minutes | {f"{column}_orbits": time / TURN for column, time in times.items()}
+        bands = [SettlingTime(band / self.scales.length_m) for band in self.thresholds_m]
+        return self.in_all_units([measure(trajectory)[measure.name] for measure in bands])
+
+    def in_all_units(self, times: Iterable[Floats]) -> dict[str, Floats]:
+        """Return the columns of dimensionless settling times to each band, (b,) each."""
+        found = dict(zip(map(column_of, self.thresholds_m), times, strict=True))
+        minutes = {f"{column}_min": self.scales.time_s / 60.0 * time for column, time in found.items()}
+        return found | minutes | {f"{column}_orbits": time / TURN for column, time in found.items()}
 
 
 def column_of(threshold_m: float) -> str:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from fracctl.arrays import Floats
+from fracctl.arrays import Floats, finite
 from fracctl.compiling import compiled_with
 from fracctl.elements import Elements
 from fracctl.errors import ArgumentError
@@ -53,6 +55,8 @@ class PerturbedRelativeMotion(SecondOrder):
     """
 
     components = ("x", "y", "z")
+    dispersed = ("follower_ballistic_m2_kg",)
+    """What `dispersed_by` takes."""
 
     def __init__(
         self,
@@ -83,8 +87,9 @@ class PerturbedRelativeMotion(SecondOrder):
         self.leader = leader or Chief(semi_major_axis_km=6700.0)
         self.scales, a_km = self.leader.scales, self.leader.a_km
         oblateness, height = j2 * (planet_radius_km / a_km) ** 2, scale_height_km / a_km
-        drags = [0.5 * density_kg_m3 * b * 1e3 * a_km for b in (leader_ballistic_m2_kg, follower_ballistic_m2_kg)]
-        self._constants = np.array([oblateness, *drags, height])
+        self._drag = 0.5 * density_kg_m3 * 1e3 * a_km
+        drags = [self._drag * ballistic for ballistic in (leader_ballistic_m2_kg, follower_ballistic_m2_kg)]
+        self._constants = np.array([[oblateness, *drags, height]])
         angles = (self.leader.inclination_deg, self.leader.argument_of_latitude_deg, self.true_anomaly_deg)
         inclination, argument, anomaly = (math.radians(angle) for angle in angles)
         self._orbit = LeaderOrbit(self.eccentricity, inclination, argument, oblateness, drags[0], height, anomaly)
@@ -98,7 +103,7 @@ class PerturbedRelativeMotion(SecondOrder):
     def frame_rate(self) -> Floats:
         """Angular velocity [r a_n/h, 0, h/r²] of the frame at time 0, (3,)."""
         r, _, h, px, _, pz = self.leader_motion(np.zeros(1))[0]
-        return np.array([-3.0 * self._constants[0] / r**3 * px * pz / h, 0.0, h / r**2])
+        return np.array([-3.0 * self._constants[0, 0] / r**3 * px * pz / h, 0.0, h / r**2])
 
     @cached_property
     def period(self) -> float:  # type: ignore[override]
@@ -108,6 +113,20 @@ class PerturbedRelativeMotion(SecondOrder):
             UnsupportedError: the orbit is equatorial.
         """
         return self._orbit.nodal_period()
+
+    def dispersed_by(self, follower_ballistic_m2_kg: ArrayLike) -> PerturbedRelativeMotion:
+        """Return the plant of b followers of their own C_D A/m in m²/kg, (b,).
+
+        Raises:
+            ArgumentError: one is negative.
+        """
+        given = np.atleast_1d(finite("follower_ballistic_m2_kg", follower_ballistic_m2_kg))
+        if (given < 0.0).any():
+            raise ArgumentError("follower_ballistic_m2_kg", float(given.min()), "must not be negative")
+        other = copy.copy(self)
+        other._constants = np.repeat(self._constants, len(given), axis=0)
+        other._constants[:, 2] = self._drag * given
+        return other
 
     def leader_motion(self, t: Floats) -> Floats:
         """Return r, r', h and the polar axis in the leader's frame at times (b,) from 0 on, (b, 6)."""
@@ -125,8 +144,8 @@ class PerturbedRelativeMotion(SecondOrder):
 @compiled_with(error_model="numpy")
 def _rates(leader: Floats, x: Floats, u: Floats, constants: Floats) -> Floats:
     out = np.empty_like(x)
-    k, drag_leader, drag, height = constants
     for i in range(len(x)):
+        k, drag_leader, drag, height = constants[min(i, len(constants) - 1)]
         r, climb, h, px, py, pz = leader[i]
         bx, by, bz, vx, vy, vz = x[i]
         oblate = 3.0 * k / r**4

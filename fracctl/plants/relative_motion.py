@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import copy
 import math
+from typing import Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from fracctl.arrays import Floats
+from fracctl.arrays import Floats, finite
 from fracctl.compiling import compiled_with
 from fracctl.elements import Elements
 from fracctl.errors import ArgumentError
@@ -14,7 +17,59 @@ from fracctl.plants.hcw import Chief
 from fracctl.plants.state import SecondOrder
 
 
-class RelativeMotion(SecondOrder):
+class AboutKeplerOrbit(SecondOrder):
+    """What plants about a leader on a Kepler orbit share: the orbit, and where the leader is on it.
+
+    Args:
+        leader: the orbit's semi-major axis and the gravitational parameter; its angles matter to orbit elements only.
+        eccentricity: e in [0, 1).
+        true_anomaly_deg: of the leader at time 0, in degrees; 0 at perigee.
+
+    Raises:
+        ArgumentError: the orbit is not an ellipse, or a number is not finite.
+    """
+
+    components = ("x", "y", "z")
+    period = 2.0 * math.pi
+    dispersed = ("eccentricity", "true_anomaly_deg")
+    """What `dispersed_by` takes."""
+
+    def __init__(self, leader: Chief | None = None, eccentricity: float = 0.0, true_anomaly_deg: float = 0.0) -> None:
+        self.eccentricity, self.true_anomaly_deg = checked_phase(eccentricity, true_anomaly_deg)
+        self.leader = leader or Chief(semi_major_axis_km=6700.0)
+        self.scales = self.leader.scales
+        self._e = np.array([self.eccentricity])
+        self._mean_anomaly = np.array([mean_anomaly(self.eccentricity, math.radians(self.true_anomaly_deg))])
+
+    @property
+    def chief_elements(self) -> Elements:
+        """Those of the leader at time 0."""
+        return self.leader.elements(self.eccentricity, self.true_anomaly_deg)
+
+    def leader_motion(self, t: Floats) -> Floats:
+        """Return r, ω and ω' at times (b,), (b, 3)."""
+        return kepler_motion(t + self._mean_anomaly, np.repeat(self._e, len(t) // len(self._e)))
+
+    def dispersed_by(self, eccentricity: ArrayLike | None = None, true_anomaly_deg: ArrayLike | None = None) -> Self:
+        """Return the plant of b members, each about a leader of its own; what is not given is as it was.
+
+        Args:
+            eccentricity: e in [0, 1), (b,).
+            true_anomaly_deg: of the leaders at time 0, (b,).
+
+        Raises:
+            ArgumentError: an orbit is not an ellipse.
+        """
+        e = finite("eccentricity", self.eccentricity if eccentricity is None else eccentricity)
+        anomalies = finite("true_anomaly_deg", self.true_anomaly_deg if true_anomaly_deg is None else true_anomaly_deg)
+        pairs = [checked_phase(float(one), float(other)) for one, other in np.broadcast(*np.atleast_1d(e, anomalies))]
+        other = copy.copy(self)
+        other._e = np.array([e for e, _ in pairs])
+        other._mean_anomaly = np.array([mean_anomaly(e, math.radians(anomaly)) for e, anomaly in pairs])
+        return other
+
+
+class RelativeMotion(AboutKeplerOrbit):
     """The position of a follower in the frame `rtn` of a leader on a circular or elliptic orbit, both point masses.
 
         x'' = 2ωy' + ω'y + ω²x + g_x + υ_x,    y'' = -2ωx' - ω'x + ω²y + g_y + υ_y,    z'' = g_z + υ_z
@@ -35,24 +90,6 @@ class RelativeMotion(SecondOrder):
     Raises:
         ArgumentError: the orbit is not an ellipse, or a number is not finite.
     """
-
-    components = ("x", "y", "z")
-    period = 2.0 * math.pi
-
-    def __init__(self, leader: Chief | None = None, eccentricity: float = 0.0, true_anomaly_deg: float = 0.0) -> None:
-        self.eccentricity, self.true_anomaly_deg = checked_phase(eccentricity, true_anomaly_deg)
-        self.leader = leader or Chief(semi_major_axis_km=6700.0)
-        self.scales = self.leader.scales
-        self._mean_anomaly = mean_anomaly(self.eccentricity, math.radians(self.true_anomaly_deg))
-
-    @property
-    def chief_elements(self) -> Elements:
-        """Those of the leader at time 0."""
-        return self.leader.elements(self.eccentricity, self.true_anomaly_deg)
-
-    def leader_motion(self, t: Floats) -> Floats:
-        """Return r, ω and ω' at times (b,), (b, 3)."""
-        return kepler_motion(t + self._mean_anomaly, self.eccentricity)
 
     def rates(self, t: Floats, x: Floats, u: Floats) -> Floats:
         """Return x' of x = [x, y, z, x', y', z'], (b, 6)."""
@@ -93,11 +130,11 @@ def mean_anomaly(eccentricity: float, true_anomaly: float) -> float:
 
 
 @compiled_with(error_model="numpy")
-def kepler_motion(t: Floats, e: float) -> Floats:
-    """Return r, ω, ω' of a Kepler orbit with a = n = 1 at times from perigee (b,), (b, 3)."""
+def kepler_motion(t: Floats, eccentricity: Floats) -> Floats:
+    """Return r, ω, ω' of Kepler orbits with a = n = 1 and e (b,) at times from perigee (b,), (b, 3)."""
     out = np.empty((len(t), 3))
-    momentum = math.sqrt(1.0 - e * e)
     for i in range(len(t)):
+        e = eccentricity[i]
         mean = t[i] - 2.0 * math.pi * math.floor(t[i] / (2.0 * math.pi) + 0.5)
         anomaly = mean + math.copysign(0.85 * e, mean)
         for _ in range(50):
@@ -106,7 +143,7 @@ def kepler_motion(t: Floats, e: float) -> Floats:
             if abs(step) < 1e-15:
                 break
         r = 1.0 - e * math.cos(anomaly)
-        omega = momentum / (r * r)
+        omega = math.sqrt(1.0 - e * e) / (r * r)
         out[i, 0] = r
         out[i, 1] = omega
         out[i, 2] = -2.0 * e * math.sin(anomaly) / r * omega / r

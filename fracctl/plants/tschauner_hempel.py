@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from fracctl.arrays import Floats
-from fracctl.elements import Elements
-from fracctl.plants.hcw import Chief
-from fracctl.plants.relative_motion import checked_phase, kepler_motion, mean_anomaly
-from fracctl.plants.state import SecondOrder
+from fracctl.plants.relative_motion import AboutKeplerOrbit
 
 
-class TschaunerHempel(SecondOrder):
+class TschaunerHempel(AboutKeplerOrbit):
     """The linearisation of `RelativeMotion` about the leader: the equations of Tschauner and Hempel, frame `rtn`.
 
         x'' = 2ωy' + ω'y + (ω² + 2/r³) x + υ_x,    y'' = -2ωx' - ω'x + (ω² - 1/r³) y + υ_y,    z'' = -z/r³ + υ_z
@@ -30,24 +25,6 @@ class TschaunerHempel(SecondOrder):
     Raises:
         ArgumentError: the orbit is not an ellipse, or a number is not finite.
     """
-
-    components = ("x", "y", "z")
-    period = 2.0 * math.pi
-
-    def __init__(self, leader: Chief | None = None, eccentricity: float = 0.0, true_anomaly_deg: float = 0.0) -> None:
-        self.eccentricity, self.true_anomaly_deg = checked_phase(eccentricity, true_anomaly_deg)
-        self.leader = leader or Chief(semi_major_axis_km=6700.0)
-        self.scales = self.leader.scales
-        self._mean_anomaly = mean_anomaly(self.eccentricity, math.radians(self.true_anomaly_deg))
-
-    @property
-    def chief_elements(self) -> Elements:
-        """Those of the leader at time 0."""
-        return self.leader.elements(self.eccentricity, self.true_anomaly_deg)
-
-    def leader_motion(self, t: Floats) -> Floats:
-        """Return r, ω and ω' at times (b,), (b, 3)."""
-        return kepler_motion(t + self._mean_anomaly, self.eccentricity)
 
     def rates(self, t: Floats, x: Floats, u: Floats) -> Floats:
         """Return x' of x = [x, y, z, x', y', z'], (b, 6)."""

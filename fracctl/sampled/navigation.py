@@ -25,8 +25,8 @@ class Navigation:
     same in every batch.
 
     Args:
-        position_noise: σ_p, () or (m,), over the plant's length.
-        velocity_noise: σ_v, () or (m,), over the plant's speed.
+        position_noise: σ_p, (), (m,) or (b, m), over the plant's length.
+        velocity_noise: σ_v, (), (m,) or (b, m), over the plant's speed.
         position_bias: β_p, (), (m,) or (b, m).
         velocity_bias: β_v, (), (m,) or (b, m).
         every: measurements come every so many periods of the controller and are held in between; at least 1.
@@ -44,8 +44,8 @@ class Navigation:
     def __post_init__(self) -> None:
         for name in ("position_noise", "velocity_noise", "position_bias", "velocity_bias"):
             value = finite(name, getattr(self, name))
-            if name.endswith("noise") and (value.ndim > 1 or (value < 0.0).any()):
-                raise ArgumentError(name, value.tolist(), "must be a number or (m,), and not negative")
+            if name.endswith("noise") and (value < 0.0).any():
+                raise ArgumentError(name, float(value.min()), "must not be negative")
             object.__setattr__(self, name, value)
         if self.every < 1:
             raise ArgumentError("every", self.every, "must be at least 1")
@@ -60,7 +60,8 @@ class Navigation:
             samples: how many measurements.
         """
         shape = (len(numbers), n_controls)
-        scale = np.concatenate([np.broadcast_to(s, n_controls) for s in (self.position_noise, self.velocity_noise)])
+        noises = (self.position_noise, self.velocity_noise)
+        scale = np.concatenate([np.broadcast_to(noise, shape) for noise in noises], axis=1)
         bias = np.concatenate([np.broadcast_to(b, shape) for b in (self.position_bias, self.velocity_bias)], axis=1)
         if not scale.any():
             yield from (bias for _ in range(samples))

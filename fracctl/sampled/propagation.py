@@ -9,6 +9,7 @@ import numpy as np
 from scipy.linalg import expm
 
 from fracctl.arrays import Floats
+from fracctl.compiling import compiled_with
 from fracctl.plants.linear import LinearPlant
 from fracctl.plants.state import StatePlant
 from fracctl.solvers import dop853
@@ -53,16 +54,23 @@ def _linear(x: Floats, transition: Floats, u: Floats, input_matrix: Floats) -> F
 
 def _step(plant: StatePlant, time: float, width: float, x: Floats, u: Floats) -> Floats:
     slopes = np.empty((dop853.END, *x.shape))
-    at = np.empty(len(x))
+    at, place = np.empty(len(x)), np.empty_like(x)
     for s in range(dop853.END):
         at[:] = time + dop853.NODES[s] * width
-        slopes[s] = plant.rates(at, _combined(s, width, x, slopes), u)
-    return _combined(dop853.END, width, x, slopes)
-
-
-def _combined(stage: int, width: float, x: Floats, slopes: Floats) -> Floats:
-    out = x.copy()
-    for weight, slope in zip(dop853.COMBINE[stage, 1 : stage + 1], slopes, strict=False):
-        if weight != 0.0:
-            out += (width * weight) * slope
+        _combine(dop853.COMBINE[s, 1:], s, width, x, slopes, place)
+        slopes[s] = plant.rates(at, place, u)
+    out = np.empty_like(x)
+    _combine(dop853.COMBINE[dop853.END, 1:], dop853.END, width, x, slopes, out)
     return out
+
+
+@compiled_with(error_model="numpy")
+def _combine(weights: Floats, stages: int, width: float, x: Floats, slopes: Floats, out: Floats) -> None:
+    """Write x + h Σ_{j < stages} w_j k_j."""
+    for i in range(x.shape[0]):
+        for n in range(x.shape[1]):
+            total = 0.0
+            for j in range(stages):
+                if weights[j] != 0.0:
+                    total += weights[j] * slopes[j, i, n]
+            out[i, n] = x[i, n] + width * total

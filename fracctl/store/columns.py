@@ -19,7 +19,7 @@ SIGMA, W = "sigma", "w"
 
 TEXT = (
     *("variable", "initial_condition", "status", REASON, "kind", "objective_name", "solver", SEARCHED_FOR),
-    *("law", "part", "limit", "verdict", "found_by", "found_for", "measure"),
+    *("law", "part", "limit", "verdict", "found_by", "found_for", "measure", "stage"),
 )
 """Columns that hold words."""
 _WHOLE = (POINT, "run", "samples", EVALUATIONS_SPENT, "principal_poles", "denominator")
@@ -27,8 +27,13 @@ _FLAGS = ("stable", "all_poles_found")
 _UNITS = {
     "seconds_per_trajectory": "s",
     "_m_per_s": "m/s",
+    "_mm_s_per_orbit": "mm/s per orbit",
+    "_mm_s2": "mm/s²",
+    "_m_s": "m/s",
+    "_min": "min",
+    "_kg": "kg",
     "_mm_per_s2": "mm/s²",
-    "threshold_m": "m",
+    "_m": "m",
     "_km": "km",
     "_deg": "deg",
     "_db": "dB",
@@ -61,7 +66,9 @@ def _field(name: str, counters: Collection[str]) -> pa.Field:
 
 
 def unit(name: str) -> str:
-    """Return the unit that a column's name ends with, ``1`` for a dimensionless one."""
+    """Return the unit that a column's name ends with, ``1`` for a dimensionless one, as settling times to bands are."""
+    if name.startswith("settling_time_") and name.endswith("_m"):
+        return DIMENSIONLESS
     return next((word for suffix, word in _UNITS.items() if name.endswith(suffix)), DIMENSIONLESS)
 
 

@@ -40,7 +40,7 @@ class PopulationSearch:
         evaluations: budget of each search, at least one generation.
         starts: number of searches that differ in nothing but the seed.
         population: points of a generation, at least 8.
-        vary: design variables, or kinds of them as in `bounds`; all others keep the controller's values.
+        vary: design variables, or kinds of them as in `bounds`; all others keep the controller's values. None for all.
         objectives: names of the run's objectives; None for the primary one, with NSGA-II for all.
         constraints: upper limit by measured column, e.g. ``peak_acceleration``.
         baseline: values of varied variables that the searches compared with hold fixed.
@@ -62,13 +62,13 @@ class PopulationSearch:
         evaluations: int = 100_000,
         starts: int = 8,
         population: int = 96,
-        vary: Sequence[str] = ("gains", "orders"),
+        vary: Sequence[str] | None = ("gains", "orders"),
         objectives: Sequence[str] | None = None,
         constraints: dict[str, float] | None = None,
         baseline: dict[str, float] | None = None,
     ) -> None:
         parameters = {p.name: p for p in evaluation.law.parameters(evaluation.plant.components)}
-        variables = _variables(parameters, vary, bounds)
+        variables = _variables(parameters, list(parameters) if vary is None else vary, bounds)
         self.baseline: Mapping[str, float] = dict(baseline or {})
         free = _without(self.baseline, variables, parameters)
         _check_size("starts", starts, 1)

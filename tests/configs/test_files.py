@@ -54,11 +54,18 @@ OF_EXPERIMENTS = {
         *("initial_condition=release", "initial_condition=release_fast", "initial_condition=release_slow"),
         *("initial_condition=deployed", "initial_condition=deployed_swinging"),
     ],
+    "flight_ic1": [
+        *("evaluation=flight", "evaluation=flight_dispersed", "evaluation=flight_laws_ic1", "measures=flown"),
+        *("objectives=flown", "figures=survival", "initial_condition=ic1_distances"),
+    ],
+    "flight_ic2": ["evaluation=flight_laws_ic2", "initial_condition=ic2_distances"],
+    "flight_ic3": ["evaluation=flight_laws_ic3", "initial_condition=ic3_distances"],
+    "flight_design": ["evaluation=robust", "measures=design"],
     "tether_eccentric": ["plant=tether_eccentric", "evaluation=tether_laws_eccentric"],
     "tether_orders": ["survey=tether_orders"],
     "tether_retrieval": ["survey=tether_approaches"],
 }
-"""Options under delayed feedback, or with a memory in the loop, by an experiment that has all else they need."""
+"""Options of delayed feedback, tethers and flights, by an experiment that has all else they need."""
 
 COMPANIONS = {
     "plant=hcw": ["controller=pd_alpha_full"],
@@ -168,6 +175,12 @@ FIXED = {
 """Experiments of so few design points that they need no budget, with their number."""
 
 
+FLIGHTS = ("flight_ic1", "flight_ic2", "flight_ic3")
+TINY_FLIGHT = ["horizon_periods=1", "evaluation.samples=2", "evaluation.noise_samples=1", "evaluation.period_s=60"]
+DESIGNS = ("flight_design", "flight_design_inplane")
+TINY_DESIGN = ["survey.evaluations=96", "survey.starts=1", "evaluation.samples=4", "survey.bounds.gains=[0,4]"]
+
+
 def test_the_groups() -> None:
     assert set(catalogue().groups()) == set(GROUPS)
 
@@ -216,6 +229,24 @@ def test_a_search_runs_on_a_tiny_budget(name: str, tmp_path: Path) -> None:
     assert {path.stem for path in (result.run_directory / "figures").glob("*.pdf")} == set(config.figures)
 
 
+@pytest.mark.parametrize("name", FLIGHTS)
+def test_flights_run_on_a_tiny_budget(name: str, tmp_path: Path) -> None:
+    config = compose([f"experiment={name}", *TINY_FLIGHT, "scheduler=serial", f"output_dir={tmp_path}"])
+    result = execute(config)
+    assert result.summary["status"] == "finished"
+    assert set(result.evaluations["status"]) <= {"ok", "unsettled"}
+    assert len(result.summary["tables"]["survival"]) == 6 * 5 * 3, "laws, stages and distances"
+    assert {path.stem for path in (result.run_directory / "figures").glob("*.pdf")} == set(config.figures)
+
+
+@pytest.mark.parametrize("name", DESIGNS)
+def test_a_design_for_flights_runs_on_a_tiny_budget(name: str, tmp_path: Path) -> None:
+    config = compose([f"experiment={name}", *TINY_DESIGN, "scheduler=serial", f"output_dir={tmp_path}"])
+    result = execute(config)
+    assert result.summary["status"] == "finished"
+    assert {path.stem for path in (result.run_directory / "figures").glob("*.pdf")} == set(config.figures)
+
+
 @pytest.mark.parametrize("name", DELAYED)
 def test_an_experiment_under_delayed_feedback_runs_on_a_tiny_budget(name: str, tmp_path: Path) -> None:
     budget = ["horizon_periods=3", "solver.steps=40", *TINY_DELAYED.get(name, [])]
@@ -241,7 +272,7 @@ def test_an_experiment_with_a_memory_runs_on_a_tiny_budget(name: str, tmp_path: 
     assert {path.stem for path in (result.run_directory / "figures").glob("*.pdf")} == set(config.figures)
 
 
-OTHERS = {*CONTINUATIONS, *SEARCHES, *COMPARISONS, *DELAYED, *TETHERS}
+OTHERS = {*CONTINUATIONS, *SEARCHES, *COMPARISONS, *DELAYED, *TETHERS, *FLIGHTS, *DESIGNS}
 
 
 @pytest.mark.parametrize("name", sorted({*EXPERIMENTS} - OTHERS))

@@ -1,0 +1,79 @@
+"""Measures of linear loops, taken of sampled flights: the same columns in the same units."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from fracctl.arrays import Floats
+from fracctl.measures.fuel import DeltaV, PeakThrust, Propellant, StationKeeping, propellant_kg
+from fracctl.measures.hold_error import HoldError
+from fracctl.measures.in_units import TURN
+from fracctl.measures.settling_times import SettlingTimes
+from fracctl.sampled import SampledTrajectory, delta_v, final_rms, settling_times
+
+Columns = dict[str, Floats]
+
+
+def takes(measure: Any) -> bool:
+    """Return whether a measure, or a class of them, can be taken of sampled flights."""
+    return (measure if isinstance(measure, type) else type(measure)) in _MEASURED
+
+
+def names() -> list[str]:
+    """Names of the measures that can."""
+    return [kind.name for kind in _MEASURED]
+
+
+def measured(measure: Any, flight: SampledTrajectory) -> Columns:
+    """Return the columns of a measure for a batch of flights, (b,) each; +inf for those that diverged."""
+    columns = _MEASURED[type(measure)](measure, flight)
+    gone = flight.status != "ok"
+    return {name: np.where(gone, np.inf, values) for name, values in columns.items()}
+
+
+def _settling(measure: SettlingTimes, flight: SampledTrajectory) -> Columns:
+    bands = [band / measure.scales.length_m for band in measure.thresholds_m]
+    return measure.in_all_units(settling_times(flight, bands).T)
+
+
+def _delta_v(measure: DeltaV, flight: SampledTrajectory) -> Columns:
+    speed = measure.scales.speed_m_s
+    by_axis, together = (np.asarray(delta_v(flight, by=by)) for by in ("axis", "norm"))
+    return dict(zip(measure.columns, (speed * by_axis, speed * together), strict=True))
+
+
+def _station_keeping(measure: StationKeeping, flight: SampledTrajectory) -> Columns:
+    count = _periods_in_orbit(flight)
+    spent = np.abs(flight.commands[:, -count:]).sum(axis=(1, 2)) * flight.period
+    return {measure.columns[0]: 1e3 * measure.scales.speed_m_s * spent * TURN / (count * flight.period)}
+
+
+def _peak_thrust(measure: PeakThrust, flight: SampledTrajectory) -> Columns:
+    return {measure.columns[0]: 1e3 * measure.scales.acceleration_m_s2 * np.abs(flight.commands).max(axis=(1, 2))}
+
+
+def _propellant(measure: Propellant, flight: SampledTrajectory) -> Columns:
+    spent = np.asarray(delta_v(flight)) * measure.scales.speed_m_s
+    return {measure.columns[0]: propellant_kg(measure.spacecraft, spent)}
+
+
+def _hold_error(measure: HoldError, flight: SampledTrajectory) -> Columns:
+    position, _ = final_rms(flight, _periods_in_orbit(flight) * flight.period)
+    return {measure.columns[0]: measure.scales.length_m * np.linalg.norm(position, axis=1)}
+
+
+def _periods_in_orbit(flight: SampledTrajectory) -> int:
+    return max(1, min(round(TURN / flight.period), len(flight.times) - 1))
+
+
+_MEASURED: Mapping[Any, Callable[[Any, SampledTrajectory], Columns]] = {
+    SettlingTimes: _settling,
+    DeltaV: _delta_v,
+    StationKeeping: _station_keeping,
+    PeakThrust: _peak_thrust,
+    Propellant: _propellant,
+    HoldError: _hold_error,
+}

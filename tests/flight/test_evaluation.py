@@ -1,0 +1,246 @@
+"""Rows of flights against the library's own flights, and against each other."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fracctl as fc
+from fracctl.config.build import build_checked
+from fracctl.config.compose import compose
+from fracctl.errors import ArgumentError, ConfigurationError
+from fracctl.execution.run import execute
+from fracctl.flight import FlightEvaluation
+from fracctl.measures import settling_time
+from fracctl.measures.settling_times import SettlingTimes
+from fracctl.plants import HCW
+from fracctl.plants.relative_motion import RelativeMotion
+from fracctl.sampled import SampledLaw, delta_v, dimensionless_time, memory_for, settling_times, simulate
+
+SMALL = [
+    *("experiment=flight_ic1", "horizon_periods=1.5", "evaluation.samples=3", "evaluation.first_sample=0"),
+    *("evaluation.noise_samples=2", "evaluation.period_s=40", "figures=[]"),
+]
+ONE = ["initial_condition=[ic1]", "evaluation.band_m=1000"]
+AWAY = "{k_p_u: -9, k_p_v: 2, k_p_w: 1, k_d_u: 1, k_d_v: 1, k_d_w: 1}"
+TURN = 2.0 * np.pi
+
+
+def built(words: list[str]) -> FlightEvaluation:
+    found = build_checked(compose([*SMALL, *words]))[0]
+    assert isinstance(found, FlightEvaluation)
+    return found
+
+
+def all_points(evaluation: FlightEvaluation) -> dict[str, np.ndarray]:
+    axes = np.meshgrid(*evaluation.axes.values(), indexing="ij")
+    return {name: values.ravel() for name, values in zip(evaluation.axes, axes, strict=True)}
+
+
+@pytest.fixture(scope="module")
+def evaluation() -> FlightEvaluation:
+    return built([])
+
+
+@pytest.fixture(scope="module")
+def rows(evaluation: FlightEvaluation) -> dict[str, np.ndarray]:
+    return evaluation(all_points(evaluation))
+
+
+def of(rows: dict[str, np.ndarray], law: str, stage: str, start: str = "ic1") -> dict[str, np.ndarray]:
+    there = (rows["law"] == law) & (rows["stage"] == stage) & (rows["initial_condition"] == start)
+    return {name: values[there] for name, values in rows.items()}
+
+
+def published(name: str, evaluation: FlightEvaluation) -> fc.controllers.LinearLaw:
+    named = evaluation.laws[name]
+    return named.law.from_parameters(("u", "v", "w"), dict(named.values))  # type: ignore[return-value]
+
+
+def test_every_flight_has_its_row(evaluation: FlightEvaluation, rows: dict[str, np.ndarray]) -> None:
+    assert list(rows) == list(evaluation.row_columns)
+    for law in evaluation.laws:
+        for stage, samples in (("ideal", [0]), ("sampled", [0]), ("noisy", [0, 1]), ("dispersed", [0, 1, 2])):
+            assert of(rows, law, stage, "ic1_tenth")["sample"].tolist() == samples
+
+
+def test_the_ideal_flight_is_the_loop_of_the_library(evaluation: FlightEvaluation, rows: dict[str, np.ndarray]) -> None:
+    for name in ("published_pd", "published_pd_alpha"):
+        loop = fc.ClosedLoop(HCW(), published(name, evaluation))
+        trajectory = fc.solve(loop, [-0.001, 0.0, 0.0, 0.0, 0.002, 0.002], horizon=1.5 * TURN)
+        assert of(rows, name, "ideal")["settling_time_100_m"] == pytest.approx(settling_time(trajectory), rel=1e-6)
+        assert of(rows, name, "ideal")["stable"].tolist() == [True]
+
+
+def test_the_sampled_flight_is_that_of_the_library(evaluation: FlightEvaluation, rows: dict[str, np.ndarray]) -> None:
+    plant, law = HCW(), published("published_pd_alpha", evaluation)
+    period = dimensionless_time(plant, 40.0)
+    memory = memory_for(fc.ClosedLoop(plant, law), "exponentials", period, 0.01, "velocity")
+    sampled = SampledLaw(law, memory, period, evaluation.sampling.delay, "velocity")
+    flight = simulate(plant, sampled, [-0.001, 0.0, 0.0, 0.0, 0.002, 0.002], 1.5 * TURN)
+    found = of(rows, "published_pd_alpha", "sampled")
+    assert found["settling_time_300_m"] == settling_times(flight, [300.0 / plant.scales.length_m])
+    assert found["delta_v_m_s"] == pytest.approx(delta_v(flight) * plant.scales.speed_m_s, rel=1e-12)
+    last = flight.at_samples[0, -round(TURN / period) :, :3]
+    rms = np.sqrt((last**2).sum(axis=1).mean()) * plant.scales.length_m
+    assert found["hold_error_m"] == pytest.approx(rms, rel=1e-12)
+
+
+def test_stages_add_what_they_say(evaluation: FlightEvaluation, rows: dict[str, np.ndarray]) -> None:
+    """Noise parts samples; nonlinear motion moves what began 10 km off, and 100 times less from a tenth of that."""
+    law = "published_pd"
+    noisy, dispersed = (of(rows, law, stage) for stage in ("noisy", "dispersed"))
+    assert len(set(noisy["settling_time_1000_m"].tolist())) == 2
+    assert not np.isnan(dispersed["offset_u_percent"]).any()
+    assert np.isnan(noisy["offset_u_percent"]).all()
+    assert len(set(dispersed["mass_kg"].tolist())) == 3
+    gap = {}
+    for start in ("ic1", "ic1_tenth"):
+        flights = [evaluation.fly(start, stage, [0], {"law_number": 0.0}) for stage in ("noisy", "nonlinear")]
+        gap[start] = np.abs(flights[0].at_samples - flights[1].at_samples)[..., :3].max()
+    assert 1e-7 < gap["ic1"] < 1e-5
+    assert gap["ic1_tenth"] < 0.05 * gap["ic1"]
+
+
+def test_a_flight_by_its_number(evaluation: FlightEvaluation, rows: dict[str, np.ndarray]) -> None:
+    alone = built(["evaluation.first_sample=2", "evaluation.samples=1", "evaluation.stages=[dispersed]"])
+    found = alone(all_points(alone))
+    for name in rows.keys() - {"flight"}:
+        again, before = of(found, "pd_lag", "dispersed"), of(rows, "pd_lag", "dispersed")
+        np.testing.assert_array_equal(again[name], before[name][2:], err_msg=name)
+    flown = evaluation.fly("ic1", samples=[2], design={"law_number": float(list(evaluation.laws).index("pd_lag"))})
+    bands = np.array([300.0]) / HCW().scales.length_m
+    assert settling_times(flown, bands)[0, 0] == of(rows, "pd_lag", "dispersed")["settling_time_300_m"][2]
+
+
+def test_a_row_does_not_know_its_neighbours(evaluation: FlightEvaluation, rows: dict[str, np.ndarray]) -> None:
+    points = all_points(evaluation)
+    some = np.array([len(points["flight"]) - 1, 3, 8])
+    found = evaluation({name: values[some] for name, values in points.items()})
+    k = len(points["flight"])
+    for name in evaluation.row_columns:
+        for start in range(3):
+            np.testing.assert_array_equal(found[name][3 * start : 3 * start + 3], rows[name][some + k * start], name)
+
+
+def test_noise_is_not_drawn_from_the_stream_of_the_start(evaluation: FlightEvaluation) -> None:
+    """Both are normal numbers of a sample; were they the same, what is measured would tell of the start."""
+    drawn = evaluation.around.drawn(np.arange(3.0))
+    offsets = np.column_stack([drawn[name] for name in drawn if name.endswith("percent")]) / 5.0
+    flight = evaluation.fly("ic1_tenth", "noisy", range(3), {"law_number": 0.0})
+    ideal = evaluation.fly("ic1_tenth", "sampled", range(3), {"law_number": 0.0})
+    scales, sampled = HCW().scales, evaluation.sampling
+    first = (flight.commands[:, 0] - ideal.commands[:, 0]) * scales.acceleration_m_s2
+    law = published("published_pd", evaluation)
+    k_p, k_d = np.asarray(law.k_p) / scales.time_s**2, np.asarray(law.k_d) / scales.time_s  # type: ignore[attr-defined]
+    same = -(offsets[:, :3] @ k_p.T + 0.01 * offsets[:, 3:] @ k_d.T)
+    assert sampled.feed == "velocity"
+    assert np.abs(first - same).max() > 0.2 * np.abs(first).max()
+
+
+def test_a_law_that_is_not_stable_is_not_flown() -> None:
+    alone = built([*ONE, f"evaluation.laws={{away: {{type: pd, values: {AWAY}}}}}"])
+    found = alone(all_points(alone))
+    away = found["law"] == "away"
+    assert set(found["status"][away].tolist()) == {"unstable"}
+    assert "unstable" not in found["status"][~away]
+    assert np.isinf(found["settling_time_100_m"][away]).all()
+    assert found["stable"][away].tolist() == [False] * away.sum()
+
+
+def test_flights_outside_their_band_are_unsettled(rows: dict[str, np.ndarray]) -> None:
+    infinite = np.isinf(of(rows, "published_pd", "dispersed", "ic1_hundredth")["settling_time_1_m"])
+    words = of(rows, "published_pd", "dispersed", "ic1_hundredth")["status"]
+    assert infinite.any()
+    assert (words[infinite] == "unsettled").all()
+
+
+def test_one_law_over_its_gains(tmp_path: Path) -> None:
+    words = [
+        "evaluation=flight",
+        "survey=out_of_plane_gains",
+        "survey.axes={k_p_w: [0.5, 0.8], k_d_w: [2]}",
+        "survey.slice=null",
+    ]
+    words += ["plant=hcw_out_of_plane", "controller=pd_alpha", "initial_condition=[ic1]", f"output_dir={tmp_path}"]
+    words += ["evaluation.truth=null", "evaluation.dispersions={}", "controller.k_d_w=2", "survey.baseline={}"]
+    result = execute(compose([*SMALL, "evaluation.laws={}", *words]))
+    records = result.summary["tables"]["survival"]
+    assert {(record["k_p_w"], record["stage"]) for record in records} >= {(0.5, "ideal"), (0.8, "dispersed")}
+    assert len(records) == 10
+
+
+def test_what_survives(evaluation: FlightEvaluation, rows: dict[str, np.ndarray]) -> None:
+    found = evaluation.conclude([rows])
+    (record,) = (
+        r
+        for r in found.tables["survival"]
+        if (r["law"], r["stage"], r["initial_condition"]) == ("published_pd", "dispersed", "ic1")
+    )
+    times = of(rows, "published_pd", "dispersed")["settling_time_100_m_orbits"]
+    assert record["samples"] == 3
+    assert record["median_orbits"] == np.sort(times)[1]
+    assert record["quantile_95_orbits"] == times.max()
+    assert record["worst_sample"] == np.argmax(times)
+    assert record["settled_percent"] == 100.0 * np.isfinite(times).mean()
+    assert any(note.startswith("ic1 to 100 m, fastest ideal: ") for note in found.notes)
+
+
+def test_the_table_is_that_of_any_number_of_workers(tmp_path: Path) -> None:
+    def table(scheduler: str) -> str:
+        words = [*SMALL, *ONE, "evaluation.stages=[noisy,dispersed]", f"output_dir={tmp_path / scheduler}"]
+        where = execute(compose([*words, f"scheduler={scheduler}"])).run_directory
+        return (where / "survival.csv").read_text()
+
+    assert table("serial") == table("local")
+
+
+def test_truth_with_drag_on_followers_of_their_own() -> None:
+    words = ["evaluation.truth={type: perturbed_relative_motion, density_kg_m3: 5e-12}", "plant.chief.altitude_km=400"]
+    words += ["plant.chief.semi_major_axis_km=null", "evaluation.dispersions.eccentricity=null"]
+    words += ["evaluation.dispersions.true_anomaly_deg=null", "evaluation.stages=[nonlinear,dispersed]"]
+    found = built([*ONE, *words, "+evaluation.dispersions.follower_ballistic_m2_kg=[uniform, 0.01, 0.03]"])
+    rows = found(all_points(found))
+    assert set(of(rows, "published_pd", "dispersed")["status"].tolist()) <= {"ok", "unsettled"}
+    assert len(set(of(rows, "pd", "dispersed")["follower_ballistic_m2_kg"].tolist())) == 3
+
+
+REFUSED = [
+    (["evaluation.stages=[ideal,tested]"], "evaluation.stages = tested: must be among ideal"),
+    (["evaluation.band_m=55"], "evaluation.band_m = 55: must be one of the measured bands"),
+    (["~evaluation.band_m.ic1_tenth"], "must hold a band for ic1_"),
+    (["measures=standard", "objectives=settling_time"], "measures = settling_time: cannot be taken of flights"),
+    (["solver.cross_check=0.5"], "solver.cross_check = 0.5: has no second solver"),
+    (["spacecraft.mass_kg=null", "spacecraft.thrust_n=null"], "needs a mass; set spacecraft.mass_kg"),
+    (["evaluation.truth={type: hcw}"], "evaluation.truth.type = hcw: must be motion about a leader"),
+    (["evaluation.truth={type: relative_motion, eccentricity: 2}"], "evaluation.truth.eccentricity = 2: must lie in"),
+    (["evaluation.dispersions.offset_x_m=[normal, 0, 1]"], "must be one of offset_u_m, offset_v_m"),
+    (["evaluation.memory_samples=20"], "evaluation.memory_samples = 20: goes with memory = window"),
+    (["evaluation.delay=-1"], "evaluation.delay = -1"),
+    (["survey=out_of_plane_gains"], "several laws have their own values"),
+    (["evaluation.laws.pd.values.k_p_x=1"], "evaluation.laws.pd.values = k_p_x: must name parameters"),
+    (["plant=hcw_out_of_plane", "controller=pd"], "must have 2 states"),
+]
+
+
+@pytest.mark.parametrize(("words", "sentence"), REFUSED)
+def test_refusals(words: list[str], sentence: str) -> None:
+    with pytest.raises(ConfigurationError) as caught:
+        built(words)
+    assert sentence in str(caught.value)
+
+
+def test_a_look_at_no_flight_is_refused(evaluation: FlightEvaluation) -> None:
+    with pytest.raises(ArgumentError, match="`stage`"):
+        evaluation.fly("ic1", "ideal")
+
+
+def test_the_truth_has_the_chief_of_the_design(evaluation: FlightEvaluation) -> None:
+    assert isinstance(evaluation.around.truth, RelativeMotion)
+    assert evaluation.around.truth.leader.a_km == HCW().chief.a_km
+
+
+def test_bands_are_those_of_the_measure() -> None:
+    assert "settling_time_300_m_orbits" in SettlingTimes([300.0]).columns

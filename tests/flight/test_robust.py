@@ -1,0 +1,87 @@
+"""Designs over dispersed starts, against every start solved for itself."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import fracctl as fc
+from fracctl.config.build import build_checked
+from fracctl.config.compose import compose
+from fracctl.dispersions import draws
+from fracctl.errors import ConfigurationError
+from fracctl.flight import RobustEvaluation
+from fracctl.flight.uncertain import starts
+from fracctl.measures import settling_time
+
+WORDS = ["experiment=flight_design", "evaluation.samples=20", "figures=[]"]
+DESIGN = {"alpha_w": np.array([0.91, 1.0]), "k_p_w": np.array([0.85, 0.55]), "k_d_w": np.array([2.0, 2.0])}
+
+
+def built(words: list[str]) -> RobustEvaluation:
+    found = build_checked(compose([*WORDS, *words]))[0]
+    assert isinstance(found, RobustEvaluation)
+    return found
+
+
+def test_a_row_is_the_quantile_of_its_starts() -> None:
+    evaluation = built(["evaluation.quantile=0.9"])
+    rows = evaluation(DESIGN)
+    drawn = draws(evaluation.dispersions, 0, range(20))
+    states = starts(evaluation.plant, np.array([0.0, 0.002]), drawn)
+    for place in range(2):
+        law = fc.controllers.PDAlpha(*(DESIGN[name][place] for name in ("k_p_w", "k_d_w", "alpha_w")))
+        times = [
+            settling_time(fc.solve(fc.ClosedLoop(evaluation.plant, law), state, evaluation.horizon)) for state in states
+        ]
+        assert rows["settling_time_100_m"][place] == pytest.approx(np.sort(times)[17], rel=1e-7), "18 of 20"
+        assert rows["objective"][place] == rows["settling_time_100_m"][place]
+
+
+def test_the_largest_is_the_quantile_of_all() -> None:
+    most, nearly = built(["evaluation.quantile=1"])(DESIGN), built(["evaluation.quantile=0.5"])(DESIGN)
+    assert (most["settling_time_100_m"] > nearly["settling_time_100_m"]).all()
+
+
+def test_other_samples_are_other_starts() -> None:
+    one, other = built([])(DESIGN), built(["evaluation.first_sample=20"])(DESIGN)
+    assert (one["settling_time_100_m"] != other["settling_time_100_m"]).all()
+
+
+def test_enough_starts_decide_on_the_status() -> None:
+    """A short horizon leaves some starts outside the band; a quantile that they do not reach does not see them."""
+    words = ["horizon_periods=0.63", "evaluation.samples=40", "constraints={}"]
+    some = built([*words, "evaluation.quantile=0.02"])(DESIGN)
+    every = built([*words, "evaluation.quantile=1"])(DESIGN)
+    assert some["status"].tolist()[1] == "ok"
+    assert every["status"].tolist()[1] == "unsettled"
+    assert np.isinf(every["objective"][1])
+
+
+def test_constraints_hold_for_the_quantile() -> None:
+    peak = built([])(DESIGN)["peak_acceleration_mm_s2"]
+    bound = float(peak.mean())
+    rows = built([f"constraints.peak_acceleration_mm_s2='<= {bound}'"])(DESIGN)
+    assert (rows["status"] == "beyond_limits").tolist() == (peak > bound).tolist()
+    assert peak.min() < bound < peak.max()
+
+
+def test_unstable_designs_are_told_apart() -> None:
+    rows = built([])({name: np.array([value]) for name, value in (("alpha_w", 1.0), ("k_p_w", -3.0), ("k_d_w", 1.0))})
+    assert rows["status"].tolist() == ["unstable"]
+    assert rows["stable"].tolist() == [False]
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (["evaluation.dispersions={offset_w_percent: null, offset_w_dot_percent: null}"], "must hold at least one"),
+        (["+evaluation.dispersions.mass_kg=[normal, 500, 1]"], "evaluation.dispersions = mass_kg: must be one of"),
+        (["evaluation.quantile=0"], "evaluation.quantile = 0"),
+        (["evaluation.dispersions.offset_w_percent=[normal, 0]"], "must hold 'normal' and 2 numbers"),
+    ],
+)
+def test_refusals(words: list[str], sentence: str) -> None:
+    with pytest.raises(ConfigurationError) as caught:
+        built(words)
+    assert sentence in str(caught.value)
