@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -13,6 +14,7 @@ TURN = 2.0 * math.pi
 MOST_COLUMNS = 9
 """With more columns than this a result is written from top to bottom."""
 
+_BAND_IN_UNITS = re.compile(r"settling_time_.*_m_(min|orbits)")
 _AFTER_THE_MEASURES = "objective"
 
 
@@ -96,7 +98,13 @@ def _has_changed(result: Mapping[str, Any]) -> bool:
 
 
 def _values(columns: Sequence[str], row: Mapping[str, Any]) -> list[str]:
-    return [cell for column in columns for cell in _cells(column, row.get(column))]
+    return [cell for column in columns for cell in (_band(column, row) or _cells(column, row.get(column)))]
+
+
+def _band(column: str, row: Mapping[str, Any]) -> list[str]:
+    """The settling time to a band in both units, which have columns of their own."""
+    orbits, minutes = row.get(f"{column}_orbits"), row.get(f"{column}_min")
+    return [f"{number(orbits, 4)} orbits, {number(minutes, 4)} min"] if orbits and minutes else []
 
 
 def _headings(columns: Sequence[str], name: str | None) -> list[str]:
@@ -131,7 +139,7 @@ def _columns(row: Mapping[str, Any]) -> list[str]:
     """Design variables and measures: the columns before the objective's."""
     names = list(row)
     end = names.index(_AFTER_THE_MEASURES) if _AFTER_THE_MEASURES in names else len(names)
-    return [name for name in names[:end] if name != "initial_condition"]
+    return [name for name in names[:end] if name != "initial_condition" and not _BAND_IN_UNITS.fullmatch(name)]
 
 
 def _heading(column: str, name: str | None) -> list[str]:

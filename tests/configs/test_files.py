@@ -178,7 +178,13 @@ FIXED = {
 FLIGHTS = ("flight_ic1", "flight_ic2", "flight_ic3")
 TINY_FLIGHT = ["horizon_periods=1", "evaluation.samples=2", "evaluation.noise_samples=1", "evaluation.period_s=60"]
 DESIGNS = ("flight_design", "flight_design_inplane")
-TINY_DESIGN = ["survey.evaluations=96", "survey.starts=1", "evaluation.samples=4", "survey.bounds.gains=[0,4]"]
+TINY_DESIGN = [
+    "survey.evaluations=480",
+    "survey.starts=1",
+    "evaluation.samples=4",
+    "survey.bounds.gains=[0,4]",
+    "~constraints.peak_acceleration_mm_s2",
+]
 
 
 def test_the_groups() -> None:

@@ -222,3 +222,16 @@ def test_five_hundred_noisy_limited_nonlinear_flights_take_less_than_a_minute() 
     settled = settling_times(flights, [1e-4])
     assert time.process_time() - begin < 60.0
     assert np.isfinite(settled).all()
+
+
+def test_small_distances_fly_as_the_linear_loop_at_second_order() -> None:
+    """The first terms of the attraction that are left out are quadratic: half the distance, a quarter of the gap."""
+    plant = HCW()
+    law = SampledLaw(PDAlpha(*GAINS), Window(60), dimensionless_time(plant, 60.0), delay=0.3)
+    start, gaps = np.array([-0.001, 0.0, 0.0, 0.0, 0.002, 0.002]), []
+    for factor in (1.0, 0.5, 0.25):
+        flights = [simulate(kind, law, factor * start, ORBIT) for kind in (plant, RelativeMotion(plant.chief))]
+        gaps.append(np.abs(flights[0].at_samples - flights[1].at_samples).max())
+    orders = np.log2(np.array(gaps[:-1]) / gaps[1:])
+    np.testing.assert_allclose(orders, 2.0, atol=0.02)
+    assert gaps[0] < 1e-6
