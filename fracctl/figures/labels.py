@@ -71,10 +71,11 @@ def objective(columns: Sequence[str]) -> str:
 
 
 def initial_condition(name: str) -> str:
-    """``ic1`` is IC1, ``rho_1_9`` ρ = 1.9; other names lose their underscores."""
+    """``ic1`` is IC1, ``ic1_tenth`` IC1 tenth, ``rho_1_9`` ρ = 1.9; other names lose their underscores."""
     if found := re.fullmatch(r"rho_(\d+)_(\d+)", name):
         return rf"$\rho = {found[1]}.{found[2]}$"
-    return name.upper() if re.fullmatch(r"ic\d+", name) else name.replace("_", " ")
+    first, *rest = name.split("_")
+    return " ".join([first.upper() if re.fullmatch(r"ic\d+", first) else first, *rest])
 
 
 def controller(row: Mapping[str, Any]) -> str:

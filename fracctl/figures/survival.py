@@ -64,11 +64,13 @@ def build(results: Results, selection: Selection) -> tuple[Figure, pd.DataFrame]
 def _settling(ax: Axes, own: pd.DataFrame, laws: list[str], stages: list[str]) -> None:
     columns = ("median_orbits", "quantile_95_orbits")
     table = own[list(columns)].to_numpy(float)
-    top = _NEVER * float(table[np.isfinite(table)].max(initial=1.0))
-    ax.axhline(top, color=GREY, linewidth=0.5, linestyle=":")
-    ax.annotate("never", (0.0, top), xycoords=("axes fraction", "data"), xytext=(3, 2), textcoords="offset points")
+    longest = float(table[np.isfinite(table)].max(initial=0.0)) or 1.0
+    top = _NEVER * longest
+    if np.isinf(table).any():
+        ax.axhline(top, color=GREY, linewidth=0.5, linestyle=":")
+        ax.annotate("never", (0.0, top), xycoords=("axes fraction", "data"), xytext=(3, 2), textcoords="offset points")
     _bars(ax, own, laws, stages, columns, top)
-    ax.set_ylim(0.0, top * 1.12)
+    ax.set_ylim(0.0, top * _NEVER)
 
 
 def _bars(
