@@ -15,7 +15,7 @@ from fracctl.errors import ArgumentError, suggestion
 from fracctl.evaluation import Evaluation
 from fracctl.surveys.base import SEARCH_COLUMNS, Block, Rows
 from fracctl.surveys.search_algorithms import NSGA2
-from fracctl.surveys.search_run import SeededSearch, Variable, latin_hypercube
+from fracctl.surveys.search_run import SeededSearch, Variable
 
 ABREAST = 4
 """Starts in a block: more are faster, fewer leave more blocks for other processes."""
@@ -44,6 +44,8 @@ class PopulationSearch:
         objectives: names of the run's objectives; None for the primary one, with NSGA-II for all.
         constraints: upper limit by measured column, e.g. ``peak_acceleration``.
         baseline: values of varied variables that the searches compared with hold fixed.
+        from_controller: whether the controller's values are a point of every first generation, for laws of which few
+            gains settle at all.
 
     Raises:
         ArgumentError: a name is unknown, a bound or a baseline lies outside the range of its variable, a number is too
@@ -66,6 +68,7 @@ class PopulationSearch:
         objectives: Sequence[str] | None = None,
         constraints: dict[str, float] | None = None,
         baseline: dict[str, float] | None = None,
+        from_controller: bool = False,
     ) -> None:
         parameters = {p.name: p for p in evaluation.law.parameters(evaluation.plant.components)}
         variables = _variables(parameters, list(parameters) if vary is None else vary, bounds)
@@ -85,7 +88,8 @@ class PopulationSearch:
             groups, aims, evaluation.initial_conditions, kinds
         ):
             seeds = tuple(_entropy(seed, start, condition, aim) for start in group)
-            search = SeededSearch(algorithm, condition, aim, varied, seeds, population, evaluations, limits)
+            known = _known(varied, held) if from_controller else None
+            search = SeededSearch(algorithm, condition, aim, varied, seeds, population, evaluations, limits, known)
             self._blocks.append(Block(len(self._blocks), self.n_points, _starts(search, fixed), search))
             self.n_points += len(seeds)
         self._untold = {block.number for block in self._blocks}
@@ -105,9 +109,18 @@ class PopulationSearch:
         self._untold.discard(number)
 
 
+def _known(variables: Sequence[Variable], values: Mapping[str, float]) -> tuple[float, ...]:
+    """Return the point of the controller; raise ArgumentError where it lies outside the bounds."""
+    for variable in variables:
+        if not variable.lower <= values[variable.name] <= variable.upper:
+            allowed = f"needs controller.{variable.name} = {values[variable.name]:g} within its bounds"
+            raise ArgumentError("from_controller", True, f"{allowed} [{variable.lower:g}, {variable.upper:g}]")
+    return tuple(values[variable.name] for variable in variables)
+
+
 def _starts(search: SeededSearch, held: Mapping[str, float]) -> dict[str, Floats]:
     """Return the first point of each search; what is not varied is as in `held`."""
-    points = np.stack([latin_hypercube(search.variables, search.population, seed)[0] for seed in search.seeds])
+    points = np.stack([search.first_generation(seed)[0] for seed in search.seeds])
     varied = {variable.name: np.ascontiguousarray(points[:, i]) for i, variable in enumerate(search.variables)}
     return {name: np.full(len(points), float(value)) for name, value in held.items()} | varied
 

@@ -60,6 +60,15 @@ class SeededSearch:
     """Evaluations of each search, exactly."""
     limits: Mapping[str, float]
     """Upper limits of measured columns."""
+    known: tuple[float, ...] | None = None
+    """Values of the variables at a point that every search begins with besides its random ones."""
+
+    def first_generation(self, seed: Sequence[int]) -> Floats:
+        """Return the points that the search of a seed begins with, (population, n)."""
+        points = latin_hypercube(self.variables, self.population, seed)
+        if self.known is not None:
+            points[0] = self.known
+        return points
 
     def __call__(self, evaluation: Evaluation, starts: Mapping[str, Floats]) -> dict[str, Array]:
         """Return the paths of all searches, as `fracctl.surveys.base.Search` says."""
@@ -85,7 +94,7 @@ class SeededSearch:
         number = int(np.random.SeedSequence(seed).generate_state(1)[0])
         return Optimiser(
             self.algorithm,
-            latin_hypercube(self.variables, self.population, seed),
+            self.first_generation(seed),
             lower,
             upper,
             len(self.objectives),
