@@ -17,7 +17,7 @@ class RunError(FracctlError):
 
 
 class IncompleteRunWarning(UserWarning):
-    """The result of a run lacks points, or two solvers disagree on it."""
+    """The result of a run lacks points, or a check of it failed."""
 
 
 class UsageError(FracctlError):

@@ -20,7 +20,7 @@ def run(experiment: str, overrides: Sequence[str] = (), *, config_dir: str | Pat
         config_dir: a directory of your own configuration files.
 
     Warns:
-        IncompleteRunWarning: points are missing, or two solvers disagree; `RunResult.status` says so too.
+        IncompleteRunWarning: points are missing, or a check of the result failed; `RunResult.status` says so too.
 
     Raises:
         ConfigurationError: a key is unknown or a value out of range.

@@ -38,7 +38,7 @@ class RunResult:
 
     @property
     def status(self) -> str:
-        """``finished``; ``incomplete`` where points are missing, ``failed`` where solvers disagree."""
+        """``finished``; ``incomplete`` where points are missing, ``failed`` where a check of the result did."""
         return str(self.summary["status"])
 
     @cached_property
