@@ -12,10 +12,11 @@ from typing import Any
 import pyarrow as pa
 
 from fracctl.config.schemas import RunConfig
+from fracctl.execution.perform import directory_of
 from fracctl.store import tables
 from fracctl.store.columns import DIMENSIONLESS, unit
 from fracctl.store.files import make_directory
-from fracctl.store.identity import canonical_json, run_id
+from fracctl.store.identity import canonical_json
 from fracctl.units import Scales
 
 FOLDER = "multirun"
@@ -46,7 +47,7 @@ class Entry:
 
 def summary_path(configs: Sequence[RunConfig]) -> Path:
     """Return ``<output_dir>/multirun/<id>/summary.parquet``; the id is a hash of the runs, whatever their order."""
-    ids = sorted({run_id(config.model_dump(mode="json")) for config in configs})
+    ids = sorted({directory_of(config.model_dump(mode="json")).path.name for config in configs})
     folder = hashlib.sha256(canonical_json(ids).encode()).hexdigest()[: len(ids[0])]
     return Path(configs[0].output_dir).absolute() / FOLDER / folder / "summary.parquet"
 
@@ -98,16 +99,16 @@ def _rows(entry: Entry, numeric: set[str]) -> Iterator[dict[str, Any]]:
         "length_scale_m": entry.scales.length_m if entry.scales else None,
         "time_scale_s": entry.scales.time_s if entry.scales else None,
     }
-    found = entry.summary or {}
+    found, directory = entry.summary or {}, directory_of(config.model_dump(mode="json"))
     end = {
         "status": found.get("status", entry.status),
         "error": found.get("error", entry.error),
-        "run_id": run_id(config.model_dump(mode="json")),
-        "run_directory": found.get("run_directory"),
+        "run_id": directory.path.name,
+        "run_directory": found.get("run_directory", str(directory.path) if directory.status else None),
     }
     for result in _results(found, config.objective):
         optimum = result.get("optimum") or {}
-        condition = result.get("initial_condition") or entry.varied.get("initial_condition")
+        condition = result.get("initial_condition") or ", ".join(config.initial_condition)
         objectives = {name: value for name, value in optimum.items() if name.startswith("objective_")}
         yield {
             **common,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import cached_property
@@ -73,7 +74,7 @@ def perform(
         RunError: it could not be computed or stored, or another process is computing it.
         KeyboardInterrupt: Ctrl-C; what was computed is kept, and the next call continues from it.
     """
-    directory = directory or directory_of(job)
+    directory = directory or directory_of(job.configuration)
     if not fresh and is_whole(directory) and not _wants_other_figures(directory, job):
         return stored(directory)
     make_directory(directory.path.parent)
@@ -86,9 +87,8 @@ def perform(
         return _redrawn(directory, job)
 
 
-def directory_of(job: Job) -> RunDirectory:
-    """Return the run directory of a job."""
-    configuration = job.configuration
+def directory_of(configuration: Mapping[str, Any]) -> RunDirectory:
+    """Return the run directory of a configuration, plain data."""
     return RunDirectory(Path(configuration["output_dir"]) / configuration["name"] / run_id(configuration))
 
 

@@ -44,7 +44,9 @@ def ended(process: subprocess.Popen[str]) -> Iterator[subprocess.Popen[str]]:
         yield process
     finally:
         process.kill()
-        process.communicate()
+        process.wait()
+        if process.stderr is not None:
+            process.stderr.close()  # unread: a worker that outlives its parent holds it open
 
 
 def parts_in(folder: Path) -> list[Path]:

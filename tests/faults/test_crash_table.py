@@ -114,7 +114,7 @@ def parent_is(sent: signal.Signals, scheduler: Mapping[str, Any], kind: str | No
     def fault(folder: Path) -> None:
         faults = [] if kind is None else [{"kind": kind, "alpha_w": 0.9}]
         with ended(fake_run(folder, scheduler, seconds=0.3, faults=faults)) as process:
-            until(lambda: len(parts_in(folder)) > (1 if kind else 0))
+            until(lambda: len(parts_in(folder)) > (N_BLOCKS - 2 if kind else 0))
             workers = children_of(process.pid)
             assert len(workers) == int(scheduler.get("workers", 0))
             process.send_signal(sent)
