@@ -16,16 +16,16 @@ _RESULT = "objective"
 _SETTLING = "settling_time"
 
 
-def summary_lines(rows: Sequence[Mapping[str, Any]], varied: Sequence[str]) -> list[str]:
+def summary_lines(rows: Sequence[Mapping[str, Any]], varied: Sequence[str], runs: int) -> list[str]:
     """Return the table, one for each objective, and notes on what cannot be compared.
 
     Args:
         rows: of the summary, in their order.
         varied: keys that the sweep sets.
+        runs: how many there are.
     """
     from fracctl.execution.multirun import group_of
 
-    runs = len({row["run_id"] for row in rows})
     lines = [f"summary of {count(runs, 'run')}, best first"]
     groups = list(dict.fromkeys(group_of(row) for row in rows))
     for group in groups:

@@ -121,7 +121,7 @@ def _write_summary(path: Path, jobs: Sequence[Job], ended: Sequence[Ended]) -> l
     ]
     rows = summary_rows(entries)
     write_summary(path, rows)
-    return summary_lines(rows, list(jobs[0].varied))
+    return summary_lines(rows, list(jobs[0].varied), len(jobs))
 
 
 def _jobs(options: argparse.Namespace) -> list[Job]:

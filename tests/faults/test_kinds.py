@@ -6,6 +6,8 @@ import os
 import signal
 import subprocess
 import sys
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +16,11 @@ import pytest
 
 from fracctl.cli.main import main
 from fracctl.config.compose import compose
-from fracctl.execution.run import execute
+from fracctl.errors import RunError
+from fracctl.execution.run import RunResult, execute
+from fracctl.execution.worker import Outcome, Work, evaluate
 from fracctl.store import RunDirectory
+from fracctl.surveys import Block
 from tests.comparison.test_comparison import FEW
 from tests.faults.processes import ROOT, parts_in
 
@@ -61,6 +66,8 @@ KINDS = {
 SLOW = {"comparison", "nsga2", "cma_es", "single", "lqr_seed", "accuracy", "memory, dispersed"}
 """Kinds that take long, or that others stand for."""
 
+ONE_BLOCK = {"single", "lqr_seed", "delayed", "memory, dispersed"}
+
 _KILLED = """
 import os, signal, sys
 from fracctl.config.compose import compose
@@ -90,10 +97,31 @@ def tables(path: Path) -> dict[str, dict[str, Any]]:
     return found
 
 
-@pytest.mark.parametrize("kind", [pytest.param(kind, marks=[pytest.mark.slow] * (kind in SLOW)) for kind in KINDS])
-def test_a_killed_run_is_resumed(kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    words = [*KINDS[kind], "figures=[]", "scheduler=serial"]
-    whole = execute(compose([*words, f"output_dir={tmp_path / 'whole'}"])).run_directory
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
+    """The directory of the undisturbed run of each kind, computed when first asked for."""
+
+    @cache
+    def directory(kind: str) -> Path:
+        return execute(compose([*words_of(kind), f"output_dir={tmp_path_factory.mktemp('whole')}"])).run_directory
+
+    return directory
+
+
+def words_of(kind: str) -> list[str]:
+    return [*KINDS[kind], "figures=[]", "scheduler=serial"]
+
+
+each_kind = pytest.mark.parametrize(
+    "kind", [pytest.param(kind, marks=[pytest.mark.slow] * (kind in SLOW)) for kind in KINDS]
+)
+
+
+@each_kind
+def test_a_killed_run_is_resumed(
+    kind: str, undisturbed: Callable[[str], Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words, whole = words_of(kind), undisturbed(kind)
     command = [sys.executable, "-c", _KILLED, *words, f"output_dir={tmp_path / 'killed'}"]
     done = subprocess.run(command, cwd=ROOT, env=os.environ, capture_output=True, text=True, check=False)
     assert done.returncode == -signal.SIGKILL, done.stderr
@@ -109,3 +137,35 @@ def test_a_killed_run_is_resumed(kind: str, tmp_path: Path, capsys: pytest.Captu
     assert tables(moved) == tables(whole)
     assert RunDirectory(moved).run_json["summary"]["run_id"] == whole.name
     assert main(["validate", str(moved)]) == 0
+
+
+def assert_not_optimal(found: RunResult, failed: bool) -> None:
+    """A run with failed points is incomplete, and none of its optima is one of them."""
+    assert found.status == ("incomplete" if failed else "finished")
+    rows = found.evaluations[found.evaluations["reason"].notna()]
+    assert rows.empty is not failed
+    assert found.optima.merge(rows, on=["point", "initial_condition"]).empty
+
+
+@each_kind
+@pytest.mark.parametrize("failing", [0, 1])
+def test_failed_blocks_are_tried_again(
+    kind: str, failing: int, undisturbed: Callable[[str], Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What a search makes of a failed block does not stay in its path."""
+
+    def fails(work: Work, block: Block) -> Outcome:
+        return Outcome(None, "asked for") if block.number == failing else evaluate(work, block)
+
+    whole = undisturbed(kind)
+    config = compose([*words_of(kind), f"output_dir={tmp_path}"])
+    with monkeypatch.context() as patch:
+        patch.setattr("fracctl.execution.scheduler.evaluate", fails)
+        if kind in ONE_BLOCK and failing == 0:
+            with pytest.raises(RunError, match="every point failed: asked for"):
+                execute(config)
+        else:
+            assert_not_optimal(execute(config), failed=kind not in ONE_BLOCK)
+    (directory,) = tmp_path.glob("*/*")
+    assert main(["resume", str(directory)]) == 0
+    assert tables(directory) == tables(whole)
