@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -92,8 +93,9 @@ def _sweep(jobs: Sequence[Job], options: argparse.Namespace, executors: Executor
             if ended[-1].problem and options.fail_fast:
                 break
     except KeyboardInterrupt:
-        _write_summary(path, jobs, [*ended, Ended(None, status="interrupted")])
-        output.remark(f"summary of the runs so far: {path}")
+        with suppress(RunError):
+            _write_summary(path, jobs, [*ended, Ended(None, status="interrupted")])
+            output.remark(f"summary of the runs so far: {path}")
         raise
     failures = [(job.label, end.problem) for job, end in zip(jobs, ended, strict=False) if end.problem]
     try:

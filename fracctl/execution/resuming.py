@@ -29,7 +29,7 @@ def continuation(directory: RunDirectory, overrides: Sequence[str] = ()) -> RunC
     """
     configuration = directory.configuration
     for word in overrides:
-        if word.lstrip("+").partition("=")[0].partition(".")[0] != _SCHEDULER:
+        if word.lstrip("+~").partition("=")[0].partition(".")[0] != _SCHEDULER:
             raise UsageError(f"'resume' takes keys of the scheduler only, not '{word}'; all else is as run.json says")
     if reason := obstacle(directory):
         raise RunError(f"{directory.path} cannot be continued: {reason}")
@@ -56,12 +56,10 @@ def obstacle(directory: RunDirectory) -> str | None:
 
 
 def _scheduler(given: Mapping[str, Any], overrides: Sequence[str]) -> dict[str, Any]:
-    """The stored scheduler with overrides, or another one."""
-    words = list(overrides)
-    if not any(word.lstrip("+").startswith(f"{_SCHEDULER}=") for word in words):
-        options = {key: "null" if value is None else value for key, value in given.items() if key != "type"}
-        words[:0] = [
-            f"{_SCHEDULER}={given['type']}",
-            *(f"{_SCHEDULER}.{key}={value}" for key, value in options.items()),
-        ]
-    return compose(words).scheduler.model_dump(mode="json")
+    """The stored scheduler with some keys changed, or another one."""
+    keys = [word.lstrip("+~").partition("=")[0].partition(".")[2] for word in overrides]
+    if "" in keys:
+        return compose(overrides).scheduler.model_dump(mode="json")
+    composed = compose([f"{_SCHEDULER}={given['type']}", *overrides]).scheduler.model_dump(mode="json")
+    changed = {key.partition(".")[0] for key in keys}
+    return {**given, **{key: value for key, value in composed.items() if key in changed}}
