@@ -16,6 +16,10 @@ class RunError(FracctlError):
     """A run could not be finished (exit code 1)."""
 
 
+class IncompleteRunWarning(UserWarning):
+    """The result of a run lacks points, or a check of it failed."""
+
+
 class UsageError(FracctlError):
     """The command line was misused (exit code 2)."""
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from fracctl.cli import output
 from fracctl.cli.parser import Parser
-from fracctl.cli.table import number, table
+from fracctl.cli.table import count, number, table
 from fracctl.errors import UsageError, suggestion
 
 if TYPE_CHECKING:
@@ -108,9 +108,19 @@ def _run(path: Path) -> list[str] | None:
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
         started = str(content["provenance"]["started"])
-        return [started, str(content["status"]), _result(content), str(path.parent)]
+        return [started, _status(content, path.parent), _result(content), str(path.parent)]
     except (OSError, ValueError, KeyError, TypeError):
         return None
+
+
+def _status(content: Any, directory: Path) -> str:
+    """Status of a run, with what its result lacks."""
+    from fracctl.store.lock import holder
+
+    status, failed = str(content["status"]), (content.get("summary") or {}).get("failed_points")
+    if status == "running" and holder(directory.with_name(f".{directory.name}.lock")) is None:
+        return "stopped"
+    return f"{status}, {count(failed, 'point')} missing" if failed and status == "incomplete" else status
 
 
 def _result(content: Any) -> str:

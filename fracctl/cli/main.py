@@ -6,13 +6,14 @@ import sys
 from collections.abc import Sequence
 from types import ModuleType
 
-from fracctl.cli import export, listing, output, reproduce, run, show, validate
+from fracctl.cli import export, listing, output, reproduce, resume, run, show, validate
 from fracctl.cli.failure import report
 from fracctl.errors import UsageError, suggestion
 
 INTERRUPTED = 130
 COMMANDS: dict[str, ModuleType] = {
     "run": run,
+    "resume": resume,
     "reproduce": reproduce,
     "list": listing,
     "show": show,

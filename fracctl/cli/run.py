@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 import argparse
-import json
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from fracctl.cli import output
-from fracctl.cli.comparison import comparison_lines
 from fracctl.cli.failure import report, sentence
-from fracctl.cli.laws import law_lines, quantile_lines, survival_lines
+from fracctl.cli.multirun import summary_lines
 from fracctl.cli.parser import Parser
-from fracctl.cli.table import ResultTable
-from fracctl.errors import ConfigurationError, FracctlError
+from fracctl.cli.showing import Ended, Job, add_display_options, compute_and_show
+from fracctl.errors import ConfigurationError, RunError
 
 if TYPE_CHECKING:
-    from fracctl.config.schemas import RunConfig
     from fracctl.execution.executors import Executors
 
 SUMMARY = "compute an experiment, or a run composed from options; store it and draw its figures"
@@ -28,7 +26,8 @@ Compute a run and store it below outputs/. Without overrides: one out-of-plane P
 
 The result is a short table, and as the last line the run's directory. A run that is stored already is not computed
 again; one that was interrupted continues. With -m, values separated by commas give one run each; all of them are
-composed and checked before the first one starts."""
+composed and checked before the first one starts. At the end stands a table of all, best first, and the file that holds
+it, outputs/multirun/<id>/summary.parquet; with --json its path stands in every line."""
 
 _EXAMPLES = """\
   fracctl run experiment=ic1_outofplane                           the best gains and order from IC1
@@ -40,24 +39,6 @@ _EXAMPLES = """\
   fracctl run experiment=outofplane --cfg job                     print the configuration only"""
 
 
-MOST_DESIGN_VARIABLES = 10
-"""Of a law with more parameters, the table shows those that the survey varies."""
-
-_KEYS = (
-    *("experiment", "run_id", "run_directory", "status", "reused"),
-    *("optimum", "baseline", "change_percent", "error"),
-)
-
-
-@dataclass(frozen=True)
-class _Job:
-    """One run of the command line."""
-
-    config: RunConfig
-    label: str
-    """``run 2 of 3 (experiment=…): ``, empty for a single run."""
-
-
 def parser() -> Parser:
     """Return the command's parser."""
     parser = Parser("run", "[OVERRIDE …]", _DESCRIPTION, _EXAMPLES)
@@ -67,9 +48,8 @@ def parser() -> Parser:
         "--cfg", choices=["job"], metavar="job", help="'--cfg job' prints the resolved configuration and exits"
     )
     parser.add_config_dir()
-    parser.add_argument("--json", action="store_true", help="one JSON object a line for each run, and nothing else")
     parser.add_argument("--fresh", action="store_true", help="compute again what is stored already")
-    parser.add_argument("--quiet", action="store_true", help="no progress on standard error, no notes")
+    add_display_options(parser)
     parser.add_argument("--fail-fast", action="store_true", help="with -m: do not start further runs after a failure")
     return parser
 
@@ -84,18 +64,69 @@ def execute(options: argparse.Namespace) -> int:
         return 0
     from fracctl.execution.executors import Executors
 
-    failures: list[tuple[_Job, Exception]] = []
     with Executors() as executors:
+        if options.multirun:
+            return _sweep(jobs, options, executors)
+        problem = _run(jobs[0], options, executors).problem
+    return report(problem, options.debug) if problem else 0
+
+
+def _run(job: Job, options: argparse.Namespace, executors: Executors) -> Ended:
+    from fracctl.execution.run import execute as execute_run
+
+    return compute_and_show(
+        job,
+        options,
+        lambda progress: execute_run(job.config, fresh=options.fresh, progress=progress, executors=executors),
+    )
+
+
+def _sweep(jobs: Sequence[Job], options: argparse.Namespace, executors: Executors) -> int:
+    """Compute all runs, write and show their summary, and list the failures."""
+    from fracctl.execution.multirun import summary_path
+
+    path = summary_path([job.config for job in jobs])
+    ended: list[Ended] = []
+    try:
         for job in jobs:
-            problem = _run(job, options, executors)
-            if problem is not None:
-                failures.append((job, problem))
-                if options.fail_fast:
-                    break
-    return _report(failures, options, several=len(jobs) > 1)
+            ended.append(_run(replace(job, further={"multirun_summary": str(path)}), options, executors))
+            if ended[-1].problem and options.fail_fast:
+                break
+    except KeyboardInterrupt:
+        with suppress(RunError):
+            _write_summary(path, jobs, [*ended, Ended(None, status="interrupted")])
+            output.remark(f"summary of the runs so far: {path}")
+        raise
+    failures = [(job.label, end.problem) for job, end in zip(jobs, ended, strict=False) if end.problem]
+    try:
+        lines = _write_summary(path, jobs, ended)
+    except RunError as problem:
+        failures.append(("summary: ", problem))
+    else:
+        for line in () if options.json else (*lines, str(path)):
+            output.say(line)
+    for label, failure in failures:
+        report(failure, options.debug, label)
+    return 1 if failures else 0
 
 
-def _jobs(options: argparse.Namespace) -> list[_Job]:
+def _write_summary(path: Path, jobs: Sequence[Job], ended: Sequence[Ended]) -> list[str]:
+    """Write the summary, and return it as lines."""
+    from fracctl.execution.multirun import Entry, summary_rows, write_summary
+
+    missing = [Ended(None, status="not started")] * (len(jobs) - len(ended))
+    entries = [
+        Entry(
+            job.config, job.varied, job.scales, end.summary, sentence(end.problem) if end.problem else None, end.status
+        )
+        for job, end in zip(jobs, [*ended, *missing], strict=True)
+    ]
+    rows = summary_rows(entries)
+    write_summary(path, rows)
+    return summary_lines(rows, list(jobs[0].varied), len(jobs))
+
+
+def _jobs(options: argparse.Namespace) -> list[Job]:
     """Compose and validate every run."""
     from fracctl.config.build import build_checked
     from fracctl.config.compose import compose, expand_multirun
@@ -105,8 +136,8 @@ def _jobs(options: argparse.Namespace) -> list[_Job]:
     if not options.multirun:
         config = compose(overrides, options.config_dir)
         build_checked(config)
-        return [_Job(config, "")]
-    jobs: list[_Job] = []
+        return [Job(config)]
+    jobs: list[Job] = []
     problems: list[tuple[str, str]] = []
     expanded = expand_multirun(overrides, options.config_dir)
     for place, words in enumerate(expanded, start=1):
@@ -114,8 +145,9 @@ def _jobs(options: argparse.Namespace) -> list[_Job]:
         label = f"run {place} of {len(expanded)} ({' '.join(varied)}): " if len(expanded) > 1 else ""
         try:
             config = compose(words, options.config_dir)
-            build_checked(config)
-            jobs.append(_Job(config, label))
+            evaluation, _ = build_checked(config)
+            pairs = (word.lstrip("+").partition("=") for word in varied)
+            jobs.append(Job(config, label, {key: value for key, _, value in pairs}, evaluation.plant.scales))
         except ConfigurationError as error:
             problems += [(label, line) for line in str(error).splitlines()]
     if problems:
@@ -128,77 +160,3 @@ def _merged(problems: Sequence[tuple[str, str]], n_jobs: int) -> list[str]:
     texts = [text for _, text in problems]
     shared = [text for text in dict.fromkeys(texts) if texts.count(text) == n_jobs]
     return shared + [label + text for label, text in problems if text not in shared]
-
-
-def _run(job: _Job, options: argparse.Namespace, executors: Executors) -> Exception | None:
-    """Compute one run and show it; return what went wrong."""
-    from fracctl.cli.progress import display
-    from fracctl.execution.run import execute as execute_run
-
-    try:
-        progress = display(job.label.removesuffix(": ") or job.config.name, options.quiet)
-        summary = execute_run(job.config, fresh=options.fresh, progress=progress, executors=executors).summary
-    except Exception as error:  # noqa: BLE001 - the other runs go on
-        if options.json:
-            output.say(_json(_failure(job.config, error)))
-        return error
-    _show(summary, job, options)
-    return FracctlError(str(summary["error"])) if summary.get("error") else None
-
-
-def _show(summary: dict[str, Any], job: _Job, options: argparse.Namespace) -> None:
-    if options.json:
-        output.say(_json(summary))
-        return
-    stored = ", stored already" if summary.get("reused") else ""
-    output.say(f"{summary['experiment']}{stored}")
-    for line in _lines(summary, job.config):
-        output.say(line)
-    for note in () if options.quiet else summary.get("notes") or ():
-        output.say(f"note: {note}")
-    output.say(str(summary["run_directory"]))
-
-
-def _lines(summary: dict[str, Any], config: RunConfig) -> list[str]:
-    tables = summary.get("tables", {})
-    if "comparison" in tables:
-        return comparison_lines(tables["comparison"], config.objectives[config.objective] == ["settling_time"])
-    if "laws" in tables:
-        return law_lines(tables["laws"])
-    if "survival" in tables:
-        return survival_lines(tables["survival"])
-    if "quantiles" in tables:
-        return quantile_lines(tables["quantiles"])
-    return _table(config).lines(summary)
-
-
-def _table(config: RunConfig) -> ResultTable:
-    """A table without the many gains of a large plant that the survey leaves alone."""
-    survey, controller = config.survey.model_dump(), config.controller.model_dump(exclude={"type"})
-    unvaried = [name for name in controller if name not in survey.get("axes", {})]
-    hidden = unvaried if len(controller) > MOST_DESIGN_VARIABLES and survey["type"] in ("single", "grid") else []
-    return ResultTable(config.objectives, hidden, "result" if survey["type"] in ("single", "lqr_seed") else "optimum")
-
-
-def _report(failures: Sequence[tuple[_Job, Exception]], options: argparse.Namespace, several: bool) -> int:
-    """Write the failures to standard error and return the exit code."""
-    codes = [report(error, options.debug, job.label) for job, error in failures]
-    return (1 if several else codes[0]) if codes else 0
-
-
-def _failure(config: RunConfig, error: Exception) -> dict[str, Any]:
-    """The JSON of a run that gave no result."""
-    found = {"experiment": config.name, "status": "failed", "reused": False, "error": sentence(error)}
-    return {key: found.get(key) for key in _KEYS}
-
-
-def _json(summary: dict[str, Any]) -> str:
-    return json.dumps(_finite(summary), ensure_ascii=False, allow_nan=False, default=str)
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {str(key): _finite(entry) for key, entry in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(entry) for entry in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -47,7 +47,7 @@ class ResultTable:
         for name in dict.fromkeys(result.get("objective_name") for result in results):
             of_name = [result for result in results if result.get("objective_name") == name]
             columns = self._columns(of_name, name)
-            lines.append(_title(name, self.objectives.get(str(name), ())))
+            lines.append(title(name, self.objectives.get(str(name), ())))
             lines += table((self._upright if len(columns) > MOST_COLUMNS else self._flat)(of_name, name, columns))
         return lines
 
@@ -129,7 +129,8 @@ def count(how_many: int, what: str, plural: str = "s") -> str:
     return f"{how_many} {what}" + ("" if how_many == 1 else plural)
 
 
-def _title(name: str | None, factors: Sequence[str]) -> str:
+def title(name: str | None, factors: Sequence[str]) -> str:
+    """Return the name of an objective, with what it is the geometric mean of."""
     if name is None or len(factors) < 2:
         return str(name or "result")
     return f"{name} = ({' · '.join(factors)})^(1/{len(factors)})"

@@ -3,18 +3,26 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from fracctl.cli import output
 from fracctl.cli.parser import Parser
 from fracctl.cli.table import count
 from fracctl.errors import RunError
 
+if TYPE_CHECKING:
+    from fracctl.store import RunDirectory
+
+_MOST_LINES = 5
+
 SUMMARY = "check a configuration, or the files of a stored run, without computing"
 
 _DESCRIPTION = """\
-Compose a run and check everything that can be wrong with it, or compare the files of a stored run with the digests in
-its manifest. Computes nothing; the exit code is 0 if all is well, 3 for a wrong configuration, 1 for a damaged run."""
+Compose a run and check everything that can be wrong with it; or verify every file of a stored run, and say what is
+missing, damaged or failed, and what cures it. Computes nothing; the exit code is 0 if all is well, 3 for a wrong
+configuration, 1 for a run that is damaged or not finished."""
 
 _EXAMPLES = """\
   fracctl validate experiment=ic1_outofplane survey.axes.alpha_w=0.7:1:0.05
@@ -50,11 +58,62 @@ def _validate_run(path: Path) -> int:
     from fracctl.store import RunDirectory
 
     directory = RunDirectory(path)
-    status = directory.run_json.get("status")
-    if not directory.has_manifest:
-        raise RunError(f"{path} is not finished (status {status}); the command that started it continues it")
-    damage = directory.verify()
-    if damage:
-        raise RunError("\n".join(damage))
-    output.say(f"valid: {path} is {status}, and every file is as it was written")
+    content = directory.run_json
+    damage = directory.verify() if directory.has_manifest else []
+    problems = [f"{path}: {line}" for line in damage] or list(_unfinished(path, directory, content))
+    if problems:
+        raise RunError("\n".join([*problems, _cure(path, directory)]))
+    output.say(f"valid: {path} is finished, and every file is as it was written")
     return 0
+
+
+def _unfinished(path: Path, directory: RunDirectory, content: Mapping[str, Any]) -> Iterator[str]:
+    """Yield what an undamaged run lacks."""
+    from fracctl.store.inspection import inspect
+
+    status = content.get("status")
+    if directory.has_manifest and status == "finished":
+        return
+    found = inspect(directory.parts)
+    of_all = _of_all(directory)
+    reason = f"; {content['error']}" if content.get("error") else ""
+    yield f"{path} {_state(directory, status)}: {count(found.points, 'point')}{of_all} stored{reason}"
+    yield from _some(f"{path}: parts/{name} cannot be trusted: {why}" for name, why in found.damaged.items())
+    yield from _some(f"{path}: the points of parts/{name} failed: {why}" for name, why in found.failed.items())
+
+
+def _state(directory: RunDirectory, status: object) -> str:
+    if process := directory.computed_by:
+        return f"is being computed by process {process}"
+    if status in ("running", "finished"):
+        return "was stopped in the middle"
+    return f"is {status}" if status == "incomplete" else f"has {status}" if status == "failed" else f"was {status}"
+
+
+def _of_all(directory: RunDirectory) -> str:
+    """`` of 9``, empty where only the run itself can tell."""
+    from fracctl.config.build import build_checked
+    from fracctl.config.schemas import RunConfig
+    from fracctl.execution.resuming import obstacle
+
+    if obstacle(directory):
+        return ""
+    _, survey = build_checked(RunConfig.model_validate(directory.configuration))
+    return f" of {survey.n_points}" if survey.n_points else ""
+
+
+def _some(lines: Iterable[str]) -> Iterator[str]:
+    """The first few lines, and how many more there are."""
+    found = list(lines)
+    yield from found[:_MOST_LINES]
+    if len(found) > _MOST_LINES:
+        yield f"and {len(found) - _MOST_LINES} further parts"
+
+
+def _cure(path: Path, directory: RunDirectory) -> str:
+    from fracctl.execution.resuming import obstacle
+
+    if directory.computed_by:
+        return "wait for it, or stop it by Ctrl-C; what is stored is kept"
+    reason = obstacle(directory)
+    return f"it cannot be continued: {reason}" if reason else f"'fracctl resume {path}' computes what is missing"

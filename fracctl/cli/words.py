@@ -5,7 +5,6 @@ from __future__ import annotations
 import inspect
 import math
 from collections.abc import Collection, Iterator, Mapping
-from pathlib import Path
 from typing import Any
 
 from fracctl.cli.table import count, number, table
@@ -13,8 +12,8 @@ from fracctl.comparison import ComparisonEvaluation as ComparisonEvaluated
 from fracctl.config import registry
 from fracctl.config.schemas import GridSurvey, RunConfig, SingleSurvey
 from fracctl.evaluation import Evaluation
+from fracctl.execution.perform import directory_of
 from fracctl.plants import Chief, LinearPlant
-from fracctl.store.identity import run_id
 from fracctl.surveys import Survey, axis_values
 from fracctl.surveys.base import SEARCHED_FOR
 from fracctl.units import Scales
@@ -39,7 +38,7 @@ def explain(config: RunConfig, evaluation: Evaluation, survey: Survey) -> list[s
         *_survey(config, evaluation, survey),
         ("scheduler", _scheduler(config)),
         ("figures", ", ".join(config.figures) or "none"),
-        ("stored in", str(_directory(config))),
+        ("stored in", str(directory_of(config.model_dump(mode="json")).path)),
     ]
     return [config.name, *table([[name, text] for name, text in rows])]
 
@@ -176,11 +175,9 @@ def _scheduler(config: RunConfig) -> str:
     if config.scheduler.type == "serial":
         return "serial: in this process"
     workers = getattr(config.scheduler, "workers", None)
-    return f"{config.scheduler.type}: {workers or 'as many worker processes as cores'}"
-
-
-def _directory(config: RunConfig) -> Path:
-    return Path(config.output_dir).absolute() / config.name / run_id(config.model_dump(mode="json"))
+    limit = getattr(config.scheduler, "time_limit", None)
+    end = f"; a block may take {number(limit)} s" if limit else ""
+    return f"{config.scheduler.type}: {workers or 'as many worker processes as cores'}{end}"
 
 
 def _described(thing: Any) -> str:

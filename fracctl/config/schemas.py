@@ -54,6 +54,16 @@ class SerialScheduler(Typed):
 
     type: Literal["serial"] = "serial"
 
+    @model_validator(mode="before")
+    @classmethod
+    def _without_limit(cls, data: Any) -> Any:
+        """Refuse a time limit: a process cannot leave what it is computing itself."""
+        given = data.get("time_limit") if isinstance(data, Mapping) else None
+        if given is not None:
+            allowed = "only worker processes can be stopped in the middle of a block; use scheduler=local"
+            raise refuse(refusal(("time_limit",), given, allowed))
+        return data
+
 
 class LocalScheduler(Typed):
     """Worker processes on this machine."""
@@ -61,6 +71,8 @@ class LocalScheduler(Typed):
     type: Literal["local"] = "local"
     workers: Annotated[Whole, Field(ge=1)] | None = None
     """How many; None for one a core."""
+    time_limit: Positive = None
+    """Seconds that a block may take before its worker is killed; None for no limit."""
 
 
 class Figure(Typed):

@@ -25,7 +25,7 @@ from fracctl.execution.record import Record, run_log
 from fracctl.execution.row_store import RowStore, evaluations_schema
 from fracctl.execution.scheduler import Scheduler
 from fracctl.execution.solving_again import solve_again
-from fracctl.execution.summary import Tally, notes_on, plain_tables, results, summarise
+from fracctl.execution.summary import Tally, missing, notes_on, plain_tables, results, summarise
 from fracctl.execution.tails import notes_on_tails
 from fracctl.execution.trajectories import trajectories
 from fracctl.execution.worker import Work, describe
@@ -123,7 +123,7 @@ class Computation:
         self._trajectories()
         found = results(self._evaluation, optima)
         tails = notes_on_tails(self._evaluation, found)
-        undrawn = draw_figures(self._directory, self._job.configuration["figures"])
+        undrawn = draw_figures(self._directory, self._job.configuration["figures"], missing(store.failed_points))
         check.finish()
         self._record.foreign_cpu_time_s += check.foreign_cpu_time_s
         notes = self._notes + notes_on(found, self._survey.baseline, tally)
@@ -132,7 +132,7 @@ class Computation:
         notes += [*tails, *check.notes(), *conclusion.notes, *undrawn]
         identity = {
             "experiment": str(self._job.configuration["name"]),
-            "run_id": self._directory.path.name,
+            "run_id": self._record.run_id,
             "run_directory": str(self._directory.path),
         }
         tables = {"tables": plain_tables(conclusion.shown)} if conclusion.shown else {}

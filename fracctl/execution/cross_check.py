@@ -13,7 +13,6 @@ import numpy as np
 from fracctl.arrays import Array
 from fracctl.evaluation import Evaluation
 from fracctl.execution.processes import WorkerLost
-from fracctl.execution.scheduler import ATTEMPTS
 from fracctl.execution.solving_again import Found
 from fracctl.surveys.base import Rows
 
@@ -31,7 +30,7 @@ class CrossCheck:
     The solvers disagree where positions or controls differ, relative to their peaks, by more than ten times the
     tolerance and by more than both error estimates together. Rows are solved piece by piece, those of equal orders
     together, for they share most of the work; the pieces depend on the rows alone. A piece whose worker dies is tried
-    again, `ATTEMPTS` times in all.
+    again, as often as `WorkerLost` says.
 
     Args:
         evaluation: its solver says which share of the rows is checked, and by which solver; none for a share of 0.
@@ -134,12 +133,13 @@ class CrossCheck:
                     first = end
 
     def _awaited(self, piece: Rows, future: Future[Found]) -> Found:
-        for attempt in range(1, ATTEMPTS + 1):
+        attempt = 1
+        while True:
             try:
                 return future.result()
             except WorkerLost as problem:
-                reason = str(problem)
-            if attempt < ATTEMPTS:
-                _log.warning("rows are solved again once more: %s", reason)
-                future = self._submit(piece)
-        return Found(0, reason=reason)
+                if attempt == problem.attempts:
+                    return Found(0, reason=str(problem))
+                _log.warning("rows are solved again once more: %s", problem)
+            attempt += 1
+            future = self._submit(piece)

@@ -42,10 +42,11 @@ def n_cores() -> int:
 
 
 def make_executor(scheduler: Mapping[str, Any], n_points: int | None) -> Executor:
-    """Return the executor of the configuration's `scheduler`."""
-    if scheduler["type"] == "serial" or n_points == 1:
+    """Return the executor of the configuration's `scheduler`; a single point with a time limit has its own process."""
+    time_limit = scheduler.get("time_limit")
+    if scheduler["type"] == "serial" or (n_points == 1 and time_limit is None):
         return InProcessExecutor()
-    return ProcessExecutor(n_workers(scheduler, n_points), SINGLE_THREAD)
+    return ProcessExecutor(n_workers(scheduler, n_points), SINGLE_THREAD, time_limit)
 
 
 class Executors:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 
 from fracctl.config.compose import compose
+from fracctl.errors import IncompleteRunWarning
 from fracctl.execution.run import RunResult, execute
 
 
@@ -17,6 +19,9 @@ def run(experiment: str, overrides: Sequence[str] = (), *, config_dir: str | Pat
         overrides: as on the command line, e.g. ``["survey.axes.alpha_w=[0.91,1.0]"]``.
         config_dir: a directory of your own configuration files.
 
+    Warns:
+        IncompleteRunWarning: points are missing, or a check of the result failed; `RunResult.status` says so too.
+
     Raises:
         ConfigurationError: a key is unknown or a value out of range.
         RunError: the run could not be computed or stored.
@@ -24,4 +29,7 @@ def run(experiment: str, overrides: Sequence[str] = (), *, config_dir: str | Pat
     chosen = any(word.lstrip("+").startswith(("scheduler=", "scheduler@")) for word in overrides)
     default = [] if chosen else ["scheduler=serial"]
     arguments = [f"experiment={experiment}", *default, *overrides]
-    return execute(compose(arguments, None if config_dir is None else Path(config_dir)))
+    result = execute(compose(arguments, None if config_dir is None else Path(config_dir)))
+    if error := result.summary.get("error"):
+        warnings.warn(f"{experiment}: {error}", IncompleteRunWarning, stacklevel=2)
+    return result

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import cached_property
@@ -36,6 +37,11 @@ class RunResult:
         """Whether it was there already and nothing was computed."""
         return bool(self.summary["reused"])
 
+    @property
+    def status(self) -> str:
+        """``finished``; ``incomplete`` where points are missing, ``failed`` where a check of the result did."""
+        return str(self.summary["status"])
+
     @cached_property
     def evaluations(self) -> pd.DataFrame:
         """Every evaluated point, read at first use."""
@@ -48,13 +54,19 @@ class RunResult:
 
 
 def perform(
-    job: Job, *, fresh: bool = False, progress: Progress | None = None, executors: Executors | None = None
+    job: Job,
+    *,
+    fresh: bool = False,
+    directory: RunDirectory | None = None,
+    progress: Progress | None = None,
+    executors: Executors | None = None,
 ) -> RunResult:
     """Compute a job, or return it where it is stored already; continue it where it is unfinished.
 
     Args:
         job: what to compute.
         fresh: compute again what is stored.
+        directory: where it is stored; None for where its configuration says.
         progress: is told how far the run is.
         executors: lend worker processes to several runs; None for its own.
 
@@ -62,12 +74,12 @@ def perform(
         RunError: it could not be computed or stored, or another process is computing it.
         KeyboardInterrupt: Ctrl-C; what was computed is kept, and the next call continues from it.
     """
-    directory = directory_of(job)
-    if not fresh and _is_whole(directory) and not _wants_other_figures(directory, job):
-        return _stored(directory)
+    directory = directory or directory_of(job.configuration)
+    if not fresh and is_whole(directory) and not _wants_other_figures(directory, job):
+        return stored(directory)
     make_directory(directory.path.parent)
     with exclusive(directory.lock), single_threaded():
-        if fresh or not _is_whole(directory):
+        if fresh or not is_whole(directory):
             notes = _prepare(directory, fresh)
             with nullcontext(executors) if executors else Executors() as lenders:
                 Computation(job, directory, progress or NoProgress(), notes, lenders).run()
@@ -75,13 +87,13 @@ def perform(
         return _redrawn(directory, job)
 
 
-def directory_of(job: Job) -> RunDirectory:
-    """Return the run directory of a job."""
-    configuration = job.configuration
+def directory_of(configuration: Mapping[str, Any]) -> RunDirectory:
+    """Return the run directory of a configuration, plain data."""
     return RunDirectory(Path(configuration["output_dir"]) / configuration["name"] / run_id(configuration))
 
 
-def _is_whole(directory: RunDirectory) -> bool:
+def is_whole(directory: RunDirectory) -> bool:
+    """Return whether a run is finished and every file as it was written."""
     return directory.has_manifest and directory.status == "finished" and not directory.verify()
 
 
@@ -95,7 +107,8 @@ def _prepare(directory: RunDirectory, fresh: bool) -> list[str]:
     return [f"the stored run was damaged ({damage[0]}) and has been computed again"] if damage and not fresh else []
 
 
-def _stored(directory: RunDirectory) -> RunResult:
+def stored(directory: RunDirectory) -> RunResult:
+    """Return a finished run as it is stored."""
     summary = directory.run_json["summary"] | {"reused": True, "run_directory": str(directory.path)}
     return RunResult(directory.path, summary)
 
@@ -114,6 +127,6 @@ def _redrawn(directory: RunDirectory, job: Job) -> RunResult:
     directory.write_manifest()
     notes = draw_figures(directory, figures)
     directory.write_manifest()
-    result = _stored(directory)
+    result = stored(directory)
     result.summary["notes"] += notes
     return result

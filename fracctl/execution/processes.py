@@ -2,13 +2,15 @@
 
 A worker is a fresh interpreter: it does not import the user's script again, so scripts need no main guard, and its
 linear algebra is limited to one thread before it is loaded. One that dies takes nothing with it but the call it was
-busy with. It ends when its pipe does, so it never outlives the parent, however that ends; and it is in a process group
-of its own, so Ctrl-C in a terminal reaches the parent only.
+busy with; one that is busy with a call for too long is killed. It ends when its pipe does, and on Linux the kernel
+kills it, so it never outlives the parent, however that ends; and it is in a process group of its own, so Ctrl-C in a
+terminal reaches the parent only.
 """
 
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import multiprocessing
 import os
 import pickle
@@ -27,8 +29,24 @@ _T = TypeVar("_T")
 _PROGRAM = "import sys; sys.path[:] = {path!r}; from fracctl.execution.processes import serve; serve({descriptor})"
 
 
+_KILL_WITH_PARENT = 1
+"""PR_SET_PDEATHSIG of prctl(2)."""
+
+_BEGUN = b""
+"""What a worker says when it has loaded what a call needs, and begins with it."""
+
+
 class WorkerLost(Exception):
     """A worker ended before it answered."""
+
+    attempts = 3
+    """How often a call is tried whose worker is lost."""
+
+
+class OutOfTime(WorkerLost):
+    """A worker was killed, for it was busy with a call for too long; most likely it will be again."""
+
+    attempts = 2
 
 
 class WorkerError(Exception):
@@ -44,10 +62,14 @@ class ProcessExecutor(Executor):
     Args:
         workers: how many processes.
         environment: what they get beside this process's environment.
+        time_limit: seconds that a call may take, else its worker is killed and it raises `OutOfTime`; None for any.
     """
 
-    def __init__(self, workers: int, environment: dict[str, str] | None = None) -> None:
+    def __init__(
+        self, workers: int, environment: dict[str, str] | None = None, time_limit: float | None = None
+    ) -> None:
         self._environment = os.environ | (environment or {})
+        self._time_limit = time_limit
         self._threads = ThreadPoolExecutor(workers, thread_name_prefix="fracctl-worker")
         self._mine = threading.local()
         self._lock = threading.Lock()
@@ -77,7 +99,7 @@ class ProcessExecutor(Executor):
     def _call(self, function: Callable[..., Any], args: Any, kwargs: Any) -> Any:
         worker = self._worker()
         try:
-            return worker.call(function, args, kwargs)
+            return worker.call(pickle.dumps((function, args, kwargs), pickle.HIGHEST_PROTOCOL), self._time_limit)
         except WorkerLost:
             with self._lock:
                 self._workers.discard(worker)
@@ -99,8 +121,7 @@ class ProcessExecutor(Executor):
         with self._lock:
             self._closed = True
             for worker in self._workers:
-                with contextlib.suppress(ProcessLookupError):
-                    os.killpg(worker.process.pid, signal.SIGKILL)
+                worker.kill()
 
 
 class _Worker:
@@ -119,17 +140,30 @@ class _Worker:
                 process_group=0,
             )
 
-    def call(self, function: Callable[..., Any], args: Any, kwargs: Any) -> Any:
-        request = pickle.dumps((function, args, kwargs), pickle.HIGHEST_PROTOCOL)
+    def call(self, request: bytes, time_limit: float | None) -> Any:
         try:
             self._connection.send_bytes(request)
             answer = self._connection.recv_bytes()
+            if answer == _BEGUN:
+                answer = self._answer_within(time_limit)
         except (EOFError, OSError):
             raise WorkerLost(self.end()) from None
         done, result = pickle.loads(answer)
         if not done:
             raise WorkerError(result)
         return result
+
+    def _answer_within(self, time_limit: float | None) -> bytes:
+        if not self._connection.poll(time_limit):
+            self.kill()
+            self.end()
+            raise OutOfTime(f"it took longer than scheduler.time_limit = {time_limit:g} s; a larger one may help")
+        return self._connection.recv_bytes()
+
+    def kill(self) -> None:
+        """Kill the process in the middle of its call."""
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(self.process.pid, signal.SIGKILL)
 
     def end(self) -> str:
         """Let the process end, and return how it did."""
@@ -145,15 +179,18 @@ class _Worker:
 def serve(descriptor: int) -> None:
     """Be a worker: answer the calls that come through a pipe until it ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_KILL_WITH_PARENT, signal.SIGKILL)
     threading.Thread(target=_end_with_parent, daemon=True).start()
     with Connection(descriptor) as connection, contextlib.suppress(EOFError, OSError):
         while True:
-            connection.send_bytes(_answer(connection.recv_bytes()))
+            connection.send_bytes(_answer(connection.recv_bytes(), connection))
 
 
-def _answer(request: bytes) -> bytes:
+def _answer(request: bytes, connection: Connection) -> bytes:
     try:
         function, args, kwargs = pickle.loads(request)
+        connection.send_bytes(_BEGUN)
         return pickle.dumps((True, function(*args, **kwargs)), pickle.HIGHEST_PROTOCOL)
     except (Exception, SystemExit) as problem:  # noqa: BLE001 - the parent is told
         return pickle.dumps((False, f"{type(problem).__name__}: {problem}"))

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from fracctl.store.files import disk_errors
+from fracctl.store.identity import run_id
 from fracctl.store.provenance import provenance
 from fracctl.store.run_directory import RunDirectory
 
@@ -27,6 +28,7 @@ class Record:
     def __init__(self, directory: RunDirectory, configuration: Mapping[str, Any], workers: int) -> None:
         self._directory = directory
         self._configuration = dict(configuration)
+        self.run_id = run_id(configuration)
         before = directory.run_json.get("provenance", {}) if directory.status else {}
         self._wall_time_s = float(before.get("wall_time_s", 0.0))
         self._cpu_time_s = float(before.get("cpu_time_s", 0.0))
@@ -44,6 +46,7 @@ class Record:
         }
         content = {
             "status": status,
+            "run_id": self.run_id,
             "configuration": self._configuration,
             "provenance": self.provenance | times,
             "summary": summary,

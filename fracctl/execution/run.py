@@ -9,18 +9,25 @@ from fracctl.execution.executors import Executors
 from fracctl.execution.perform import RunResult, perform
 from fracctl.execution.progress import Progress
 from fracctl.execution.worker import Work
+from fracctl.store import RunDirectory
 
 __all__ = ["RunResult", "execute"]
 
 
 def execute(
-    config: RunConfig, *, fresh: bool = False, progress: Progress | None = None, executors: Executors | None = None
+    config: RunConfig,
+    *,
+    fresh: bool = False,
+    directory: RunDirectory | None = None,
+    progress: Progress | None = None,
+    executors: Executors | None = None,
 ) -> RunResult:
     """Compute a run, or return it where it is stored already; continue it where it is unfinished.
 
     Args:
         config: what to compute and where to store it.
         fresh: compute again what is stored.
+        directory: where it is stored; None for where the configuration says.
         progress: is told how far the run is.
         executors: lend worker processes to several runs; None for its own.
 
@@ -31,4 +38,4 @@ def execute(
     plain = config.model_dump(mode="json")
     work = Work.of("fracctl.execution.configured:evaluation_of", plain)
     job = Job(plain, work, lambda: build_survey(config, build_evaluation(config)))
-    return perform(job, fresh=fresh, progress=progress, executors=executors)
+    return perform(job, fresh=fresh, directory=directory, progress=progress, executors=executors)

@@ -9,13 +9,10 @@ from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from typing import Protocol
 
 from fracctl.errors import RunError
-from fracctl.execution.processes import WorkerLost
+from fracctl.execution.processes import OutOfTime, WorkerLost
 from fracctl.execution.worker import Outcome, Work, describe, evaluate
 from fracctl.surveys import Block, Survey
 from fracctl.surveys.base import Rows
-
-ATTEMPTS = 3
-"""How often a block is tried whose worker dies; then its points are failed."""
 
 _log = logging.getLogger(__name__)
 
@@ -35,8 +32,8 @@ class BlockStore(Protocol):
 class Scheduler:
     """Runs a survey to its end.
 
-    At most `in_flight` blocks are submitted at a time. A block whose worker dies is submitted again, `ATTEMPTS` times
-    in all; any other failure is final for this run.
+    At most `in_flight` blocks are submitted at a time. A block whose worker is lost is submitted again, as often as
+    `WorkerLost` or `OutOfTime` says; any other failure is final for this run.
 
     Args:
         survey: what is asked and told.
@@ -114,10 +111,10 @@ class Scheduler:
             self._lost_in_a_row = 0
         except WorkerLost as problem:
             self._attempts[block.number] += 1
-            self._lost_in_a_row += 1
-            if self._lost_in_a_row > ATTEMPTS * self._in_flight:
+            self._lost_in_a_row += not isinstance(problem, OutOfTime)
+            if self._lost_in_a_row > WorkerLost.attempts * self._in_flight:
                 raise RunError(f"worker processes keep ending: {problem}; scheduler=serial does without") from None
-            if self._attempts[block.number] < ATTEMPTS:
+            if self._attempts[block.number] < problem.attempts:
                 _log.warning("block %d is tried again: %s", block.number, problem)
                 self._queue.appendleft(block)
                 return

@@ -129,9 +129,15 @@ def summarise(
         "baseline": first["baseline"],
         "change_percent": first["change_percent"],
         "error": _error(store),
+        "failed_points": store.failed_points,
         "optima": list(found),
         "notes": list(notes),
     }
+
+
+def missing(failed_points: int | None) -> str:
+    """Return what stands beside a result that lacks points, empty where it lacks none."""
+    return f"incomplete: {failed_points} point{'' if failed_points == 1 else 's'} missing" if failed_points else ""
 
 
 def _error(store: RowStore) -> str | None:

@@ -74,12 +74,13 @@ class _Request:
     selection: Selection
 
 
-def draw(run: RunDirectory, figures: Mapping[str, Mapping[str, Any]]) -> list[Path]:
+def draw(run: RunDirectory, figures: Mapping[str, Mapping[str, Any]], remark: str = "") -> list[Path]:
     """Draw figures of a stored run: ``<name>.pdf``, ``<name>.png`` and the table behind them, ``<name>.csv``.
 
     Args:
         run: the run directory; nothing else is read.
         figures: file name to type and options, as in the configuration's `figures`.
+        remark: what stands below each figure, e.g. that the run lacks points.
 
     Returns:
         The files written.
@@ -93,7 +94,7 @@ def draw(run: RunDirectory, figures: Mapping[str, Mapping[str, Any]]) -> list[Pa
     problems: list[FracctlError] = []
     for request in [_request(results, name, options) for name, options in figures.items()]:
         try:
-            written += _files(run.figures, request, results)
+            written += _files(run.figures, request, results, remark)
         except FigureError as problem:
             problems.append(FigureError(f"figure '{request.name}': {problem}"))
     if problems:
@@ -113,10 +114,10 @@ def _request(results: Results, name: str, options: Mapping[str, Any]) -> _Reques
         raise ConfigurationError(f"figures.{name}: {problem}") from None
 
 
-def _files(folder: Path, request: _Request, results: Results) -> list[Path]:
+def _files(folder: Path, request: _Request, results: Results, remark: str) -> list[Path]:
     with style():
         figure, table = request.build(results, request.selection)
-        contents = render(figure)
+        contents = render(figure, remark)
     contents["csv"] = table.to_csv(index=False, lineterminator="\n").encode()
     make_directory(folder)
     paths = []

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 from matplotlib.figure import Figure
+from matplotlib.transforms import Bbox
 
 if TYPE_CHECKING:
     from matplotlib.typing import RcKeyType
@@ -18,6 +19,9 @@ FULL_WIDTH_IN = 6.9
 
 BLUE, ORANGE, GREEN, GREY = "#0072B2", "#D55E00", "#009E73", "#5A5A5A"
 """Colours that stay apart for colour-blind readers (Okabe and Ito 2008), and a grey."""
+
+_STRIP_IN = 0.22
+"""Height of the strip below a figure that holds a remark."""
 
 CYCLE = (BLUE, ORANGE, GREEN, "#CC79A7", "#E69F00", "#56B4E9")
 """Colours of further curves, in this order."""
@@ -80,15 +84,18 @@ def style() -> Iterator[None]:
         yield
 
 
-def render(figure: Figure) -> dict[str, bytes]:
-    """Return the figure as PDF and PNG files, without dates or versions in them."""
+def render(figure: Figure, remark: str = "") -> dict[str, bytes]:
+    """Return the figure as PDF and PNG files, without dates or versions in them; a remark stands below it."""
     engine = figure.get_layout_engine()
     if engine is not None:
         engine.execute(figure)
         figure.set_layout_engine("none")
+    width, height = figure.get_size_inches()
+    figure.text(0.1 / width, -0.7 * _STRIP_IN / height, remark, color=ORANGE)
+    with_strip = Bbox([[0.0, -_STRIP_IN], [width, height]])
     files = {}
     for kind, metadata in _METADATA.items():
         buffer = io.BytesIO()
-        figure.savefig(buffer, format=kind, metadata=metadata)
+        figure.savefig(buffer, format=kind, metadata=metadata, bbox_inches=with_strip if remark else None)
         files[kind] = buffer.getvalue()
     return files

@@ -15,6 +15,9 @@ PACKAGE = Path(__file__).parents[1]
 NOT_IN_IDENTITY = ("scheduler", "figures", "output_dir")
 """Keys of the configuration that change no number."""
 
+VERSIONS = ("numpy", "scipy")
+"""Packages whose versions change numbers."""
+
 _LENGTH = 12
 
 
@@ -28,7 +31,7 @@ def run_id(configuration: Mapping[str, Any], sources: str | None = None) -> str:
     what = {
         "configuration": {key: value for key, value in configuration.items() if key not in NOT_IN_IDENTITY},
         "sources": sources_digest() if sources is None else sources,
-        "versions": {name: version(name) for name in ("numpy", "scipy")},
+        "versions": {name: version(name) for name in VERSIONS},
     }
     return hashlib.sha256(canonical_json(what).encode()).hexdigest()[:_LENGTH]
 

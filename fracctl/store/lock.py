@@ -41,9 +41,9 @@ def _acquire(path: Path) -> int:
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
-            holder = os.read(descriptor, 32).decode(errors="replace").strip() or "unknown"
+            other = _written_in(descriptor)
             os.close(descriptor)
-            raise RunError(f"another process ({holder}) is computing this run; its lock is {path}") from None
+            raise RunError(f"another process ({other}) is computing this run; its lock is {path}") from None
         except OSError as problem:
             if problem.errno not in _UNSUPPORTED:
                 os.close(descriptor)
@@ -62,3 +62,24 @@ def _is_still(path: Path, descriptor: int) -> bool:
         return os.path.samestat(path.stat(), os.fstat(descriptor))
     except FileNotFoundError:
         return False
+
+
+def holder(path: Path) -> str | None:
+    """Return the id of the process that holds the lock file `path`, None if none does."""
+    try:
+        descriptor = os.open(path, os.O_RDONLY)
+    except OSError:
+        return None
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return _written_in(descriptor)
+    except OSError:
+        return None
+    finally:
+        os.close(descriptor)
+    return None
+
+
+def _written_in(descriptor: int) -> str:
+    return os.pread(descriptor, 32, 0).decode(errors="replace").strip() or "unknown"

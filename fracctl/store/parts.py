@@ -43,7 +43,7 @@ class Parts:
         with disk_errors(directory):
             for left in directory.glob(f"*{TEMPORARY}"):
                 left.unlink()
-        self._digests = dict(_read_digests(directory / _DIGESTS))
+        self._digests = dict(read_digests(directory))
 
     def save(self, number: int, rows: Mapping[str, Array], failed: str | None = None) -> None:
         """Write the rows of a block; `failed` says why the block could not be computed."""
@@ -55,7 +55,7 @@ class Parts:
     def load(self, number: int) -> dict[str, Array] | None:
         """Return the rows of a block; None where they are still to be computed, or to be tried again."""
         table = self._table(number)
-        if table is None or _FAILED in (table.schema.metadata or {}):
+        if table is None or reason_of(table) is not None:
             return None
         return columns.to_rows(table)
 
@@ -81,10 +81,7 @@ class Parts:
             return None
 
     def _verified(self, path: Path) -> pa.Table:
-        content = path.read_bytes()
-        if hashlib.sha256(content).hexdigest() != self._digests.get(path.name):
-            raise ValueError("its SHA-256 is not the one noted for it")
-        table = tables.deserialise(content)
+        table = verified(path, self._digests)
         if not table.schema.equals(self._schema, check_metadata=False):
             raise ValueError("its columns are not those of this run")
         return table
@@ -101,10 +98,28 @@ class Parts:
         return self._directory / f"{number:06d}.parquet"
 
 
-def _read_digests(path: Path) -> Iterator[tuple[str, str]]:
-    """Name and digest of every part; a line that was cut off names none."""
+def verified(path: Path, digests: Mapping[str, str]) -> pa.Table:
+    """Read a part.
+
+    Raises:
+        OSError, ValueError, pa.ArrowException: it cannot be trusted.
+    """
+    content = path.read_bytes()
+    if hashlib.sha256(content).hexdigest() != digests.get(path.name):
+        raise ValueError("its SHA-256 is not the one noted for it")
+    return tables.deserialise(content)
+
+
+def reason_of(table: pa.Table) -> str | None:
+    """Return why the block of a part could not be computed, None if it was."""
+    reason: bytes | None = (table.schema.metadata or {}).get(_FAILED)
+    return None if reason is None else reason.decode()
+
+
+def read_digests(directory: Path) -> Iterator[tuple[str, str]]:
+    """Yield name and digest of every part; a line that was cut off names none."""
     try:
-        lines = path.read_bytes().decode("ascii", errors="replace").splitlines()
+        lines = (directory / _DIGESTS).read_bytes().decode("ascii", errors="replace").splitlines()
     except FileNotFoundError:
         return
     for line in lines:

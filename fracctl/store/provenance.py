@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
-from fracctl.store.identity import PACKAGE, sources_digest
+from fracctl.store.identity import PACKAGE, VERSIONS, sources_digest
 
 _LIBRARIES = ("fracctl", "numpy", "scipy", "pandas", "pyarrow")
 
@@ -25,6 +25,20 @@ def provenance(configuration: Mapping[str, Any]) -> dict[str, Any]:
         "cores": os.cpu_count(),
         "seed": configuration.get("seed"),
     }
+
+
+def differences(before: Mapping[str, Any]) -> list[str]:
+    """Return what of `before`, which decides on a run's id, is not as it is now, e.g. ``numpy 2.1.0, now 2.2.0``."""
+    versions = before.get("versions", {})
+    found = [
+        f"{name} {versions.get(name)}, now {_version(name)}"
+        for name in VERSIONS
+        if versions.get(name) != _version(name)
+    ]
+    if before.get("sources") != sources_digest():
+        commit = f" (commit {before['commit']})" if before.get("commit") else ""
+        found.append(f"other sources of fracctl {versions.get('fracctl')}{commit}")
+    return found
 
 
 def _version(name: str) -> str | None:

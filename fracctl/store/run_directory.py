@@ -12,9 +12,11 @@ import pyarrow as pa
 
 from fracctl.arrays import Array
 from fracctl.errors import RunError
-from fracctl.store import manifest, tables
+from fracctl.store import lock, manifest, tables
 from fracctl.store.columns import records_table, to_rows, to_table
 from fracctl.store.files import make_directory, move, remove_tree, write_bytes
+
+_ANEW = "the command that started it finds what is left of it"
 
 
 class RunDirectory:
@@ -45,18 +47,33 @@ class RunDirectory:
 
     @property
     def run_json(self) -> dict[str, Any]:
-        """Contents of ``run.json``: `status`, `configuration`, `provenance`, `summary`, `error`.
+        """Contents of ``run.json``: `status`, `run_id`, `configuration`, `provenance`, `summary`, `error`.
 
         Raises:
             RunError: the directory holds no run.
         """
         try:
             content = json.loads((self.path / "run.json").read_text(encoding="utf-8"))
-        except (OSError, ValueError) as problem:
-            raise RunError(f"{self.path} holds no run: {problem}") from problem
+        except OSError as problem:
+            reason = f"run.json: {problem.strerror}; 'fracctl list runs' names those that are stored"
+            raise RunError(f"{self.path} holds no run: {reason}") from problem
+        except ValueError as problem:
+            raise RunError(f"{self.path} holds no run: run.json is damaged ({problem}); {_ANEW}") from problem
         if not isinstance(content, dict):
-            raise RunError(f"{self.path} holds no run: run.json is no mapping")
+            raise RunError(f"{self.path} holds no run: run.json is no mapping; {_ANEW}")
         return content
+
+    @property
+    def configuration(self) -> dict[str, Any]:
+        """Configuration of the run, plain data.
+
+        Raises:
+            RunError: the directory holds no run.
+        """
+        configuration = self.run_json.get("configuration")
+        if not isinstance(configuration, dict):
+            raise RunError(f"{self.path} holds no run: run.json has no configuration; {_ANEW}")
+        return configuration
 
     @property
     def status(self) -> str | None:
@@ -65,6 +82,11 @@ class RunDirectory:
             return str(self.run_json.get("status"))
         except RunError:
             return None
+
+    @property
+    def computed_by(self) -> str | None:
+        """Id of the process that computes the run at this moment, None if none does."""
+        return lock.holder(self.lock)
 
     @property
     def has_manifest(self) -> bool:

@@ -9,7 +9,7 @@ import pytest
 
 from fracctl.cli.main import main
 from fracctl.config.catalogue import built_in_directory
-from fracctl.store import RunDirectory
+from fracctl.store.lock import exclusive
 
 EXPERIMENTS = built_in_directory() / "experiment"
 
@@ -54,11 +54,13 @@ def test_list_runs(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypat
         (tmp_path / "work" / name / "0123").mkdir(parents=True)
         content |= {"configuration": {"objective": "settling_time"}, "provenance": {"started": started}}
         (tmp_path / "work" / name / "0123" / "run.json").write_text(json.dumps(content))
+    with exclusive(tmp_path / "work" / "a" / ".0123.lock"):
+        assert lines(capsys, "list", "runs", "output_dir=work")[1].split()[1] == "running"
     (tmp_path / "work" / "a" / "broken").mkdir()
     (tmp_path / "work" / "a" / "broken" / "run.json").write_text("{")
     found = [line.split() for line in lines(capsys, "list", "runs", "output_dir=work")]
     assert found[1:] == [
-        ["2026-01-01", "running", "work/a/0123"],
+        ["2026-01-01", "stopped", "work/a/0123"],
         ["2026-01-02", "finished", "settling_time", "3.01276", "work/b/0123"],
     ]
 
@@ -137,26 +139,6 @@ def test_show_names_the_directory_that_a_run_would_have(capsys: pytest.CaptureFi
 
 def test_validate_a_configuration(capsys: pytest.CaptureFixture[str]) -> None:
     assert lines(capsys, "validate") == ["valid: custom, 1 design point, 1 initial condition"]
-
-
-def test_validate_a_run(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    run = RunDirectory(tmp_path / "run")
-    run.create()
-    assert main(["validate", str(run.path)]) == 1
-    assert "holds no run" in capsys.readouterr().err
-    run.write_run_json({"status": "running"})
-    assert main(["validate", str(run.path)]) == 1
-    assert "is not finished (status running)" in capsys.readouterr().err
-    run.write_run_json({"status": "finished"})
-    run.write_manifest()
-    assert lines(capsys, "validate", str(run.path)) == [
-        f"valid: {run.path} is finished, and every file is as it was written"
-    ]
-    (run.path / "run.json").write_text('{"status": "finished"}')
-    assert main(["validate", str(run.path)]) == 1
-    captured = capsys.readouterr()
-    assert captured.out == ""
-    assert "run.json" in captured.err
 
 
 def test_show_gives_fractional_gains_their_unit(capsys: pytest.CaptureFixture[str]) -> None:

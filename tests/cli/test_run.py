@@ -52,8 +52,9 @@ def summary(name: str) -> dict[str, Any]:
 
 
 @pytest.fixture
-def stand_in(monkeypatch: pytest.MonkeyPatch) -> StandIn:
+def stand_in(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> StandIn:
     found = StandIn()
+    monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("fracctl.execution.run.execute", found)
     return found
 
@@ -174,8 +175,10 @@ def test_json_is_a_line_a_run_and_nothing_else(capsys: pytest.CaptureFixture[str
         "baseline",
         "change_percent",
         "error",
+        "multirun_summary",
     ]
     assert list(runs[0]) == keys
+    assert all(Path(run["multirun_summary"]).is_file() for run in runs)
     assert runs[0]["baseline"]["settling_time"] is None
     assert runs[0]["baseline"]["overshoot"] is None
 
@@ -205,7 +208,7 @@ def test_other_runs_go_on_after_a_failure(capsys: pytest.CaptureFixture[str], st
     assert main(["run", "-m", "controller.alpha_w=0.8,0.9,1.0"]) == 1
     captured = capsys.readouterr()
     assert len(stand_in.calls) == 3
-    assert captured.out.count("/runs/custom") == 2
+    assert captured.out.count("\n/runs/custom") == 2
     assert captured.err == "error: run 2 of 3 (controller.alpha_w=0.9): the disk is full\n"
 
 
@@ -227,9 +230,10 @@ def test_a_failed_run_has_its_line_of_json(capsys: pytest.CaptureFixture[str], s
 
 
 def test_an_incomplete_run_shows_what_it_has_and_fails(capsys: pytest.CaptureFixture[str], stand_in: StandIn) -> None:
-    stand_in.further = {"status": "incomplete", "error": "3 points could not be computed"}
-    assert main(["run"]) == 1
+    stand_in.further = {"status": "incomplete", "error": "3 points could not be computed", "failed_points": 3}
+    assert main(["run", "--quiet"]) == 1
     captured = capsys.readouterr()
+    assert captured.out.splitlines()[0] == "custom, incomplete: 3 points missing"
     assert captured.out.splitlines()[-1] == "/runs/custom/0123456789ab"
     assert captured.err == "error: 3 points could not be computed\n"
 

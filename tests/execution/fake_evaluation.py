@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
 import signal
 import sys
@@ -139,6 +140,10 @@ def commit(fault: Mapping[str, Any]) -> None:
         sys.exit(3)
     if fault["kind"] == "exits at once":
         os._exit(3)
+    if fault["kind"] == "hangs":
+        time.sleep(600.0)
+    if fault["kind"] == "hangs in a library":
+        ctypes.PyDLL(None).sleep(600)  # and lets no other thread of its process run
 
 
 def evaluation(data: Mapping[str, Any]) -> FakeEvaluation:

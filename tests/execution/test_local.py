@@ -1,4 +1,4 @@
-"""Worker processes: the same tables as in one process, and what happens when they or their parent die."""
+"""Worker processes: the same tables as in one process, and how they come and go."""
 
 from __future__ import annotations
 
@@ -7,24 +7,20 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from fracctl.errors import RunError
-from fracctl.execution.executors import Executors, make_executor
+from fracctl.execution.executors import Executors, InProcessExecutor, make_executor
 from fracctl.execution.perform import perform
-from fracctl.execution.processes import ProcessExecutor, WorkerError, WorkerLost
+from fracctl.execution.processes import OutOfTime, ProcessExecutor, WorkerError, WorkerLost
 from fracctl.execution.threads import single_threaded
-from fracctl.store import RunDirectory
-from tests.execution.fakes import N_BLOCKS, job
+from tests.execution.fakes import job
 from tests.execution.test_perform import Watch, tables_of
+from tests.faults.processes import ROOT, children_of, script, until
 
-ROOT = Path(__file__).parents[2]
 LOCAL = {"type": "local", "workers": 2}
 
 
@@ -33,17 +29,11 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return perform(job(tmp_path_factory.mktemp("undisturbed"))).run_directory
 
 
-def children() -> set[int]:
-    """Running children of this process."""
-    listing = Path(f"/proc/{os.getpid()}/task").glob("*/children")
-    return {int(pid) for path in listing for pid in path.read_text().split()}
-
-
 @pytest.fixture(autouse=True)
 def no_worker_is_left() -> Iterator[None]:
-    before = children()
+    before = set(children_of(os.getpid()))
     yield
-    assert children() <= before
+    assert set(children_of(os.getpid())) <= before
 
 
 @pytest.mark.parametrize("workers", [1, 2])
@@ -59,39 +49,6 @@ def test_a_run_may_be_continued_by_another_scheduler(tmp_path: Path, undisturbed
     found = perform(job(tmp_path))
     assert "0 were stored" not in (found.run_directory / "run.log").read_text()
     assert tables_of(found.run_directory) == tables_of(undisturbed)
-
-
-@pytest.mark.parametrize("kind", ["is killed", "exits at once"])
-def test_a_block_whose_worker_dies_is_tried_again(tmp_path: Path, undisturbed: Path, kind: str) -> None:
-    faults = [{"kind": kind, "alpha_w": alpha, "once": str(tmp_path / f"{alpha}")} for alpha in (0.8, 0.95)]
-    found = perform(job(tmp_path, LOCAL, faults=faults))
-    assert found.summary["status"] == "finished"
-    assert (found.run_directory / "run.log").read_text().count("is tried again") == 2
-    assert tables_of(found.run_directory) == tables_of(undisturbed)
-
-
-@pytest.mark.parametrize(
-    ("kind", "reason"),
-    [
-        ("is killed", "its worker process was killed by signal 9"),
-        ("exits at once", "its worker process ended with exit code 3"),
-        ("exits", "SystemExit: 3"),
-        ("returns what cannot be sent", "Can't"),
-    ],
-)
-def test_a_block_that_always_fails_harms_no_other(tmp_path: Path, kind: str, reason: str) -> None:
-    found = perform(job(tmp_path, LOCAL | {"workers": 1}, faults=[{"kind": kind, "alpha_w": 0.9}]))
-    failed = found.evaluations[found.evaluations["status"] == "failed"]
-    assert failed["alpha_w"].unique().tolist() == [0.9]
-    assert all(reason in text for text in failed["reason"].unique())
-    assert found.summary["status"] == "incomplete"
-    assert perform(job(tmp_path)).summary["status"] == "finished"
-
-
-def test_workers_that_all_die_end_the_run(tmp_path: Path) -> None:
-    faults = [{"kind": "is killed", "alpha_w": alpha} for alpha in (0.8, 0.85, 0.9, 0.95, 1.0)]
-    with pytest.raises(RunError, match="worker processes keep ending: its worker process was killed by signal 9"):
-        perform(job(tmp_path, LOCAL | {"workers": 1}, faults=faults))
 
 
 def test_the_parent_computes_with_one_thread_too() -> None:
@@ -123,6 +80,40 @@ def test_an_executor_answers_raises_and_loses() -> None:
         executor.shutdown()
 
 
+def test_an_executor_kills_what_takes_too_long() -> None:
+    executor = ProcessExecutor(1, time_limit=1.0)
+    try:
+        late, early = executor.submit(time.sleep, 60.0), executor.submit(divmod, 7, 2)
+        with pytest.raises(OutOfTime, match=r"it took longer than scheduler.time_limit = 1 s; a larger one may help"):
+            late.result()
+        assert early.result() == (3, 1)
+        assert len(executor.processes()) == 1
+    finally:
+        executor.shutdown()
+
+
+class Loaded:
+    """Comes out of a pickle as None, after a second."""
+
+    def __reduce__(self) -> tuple[object, tuple[float]]:
+        return time.sleep, (1.0,)
+
+
+def test_loading_what_a_call_needs_counts_for_no_limit() -> None:
+    executor = ProcessExecutor(1, time_limit=0.5)
+    try:
+        assert executor.submit(repr, Loaded()).result() == "None"
+    finally:
+        executor.shutdown()
+
+
+@pytest.mark.parametrize(("limit", "kind"), [(None, InProcessExecutor), (60.0, ProcessExecutor)])
+def test_a_single_point_has_a_process_where_it_may_have_to_be_killed(limit: float | None, kind: type) -> None:
+    executor = make_executor(LOCAL | {"time_limit": limit}, n_points=1)
+    executor.shutdown()
+    assert type(executor) is kind
+
+
 def test_an_executor_that_is_shut_down_kills_what_runs() -> None:
     executor = ProcessExecutor(1)
     futures = [executor.submit(time.sleep, 60.0), executor.submit(time.sleep, 60.0)]
@@ -138,7 +129,7 @@ def test_runs_share_their_workers(tmp_path: Path, undisturbed: Path) -> None:
         for seed in (0, 1):
             found = perform(job(tmp_path, LOCAL, seed=seed), executors=executors)
             assert tables_of(found.run_directory) == tables_of(undisturbed)
-            workers = children()
+            workers = set(children_of(os.getpid()))
             assert len(workers) == 2
             with executors.lent(LOCAL, n_points=None) as executor:
                 assert isinstance(executor, ProcessExecutor)
@@ -149,7 +140,7 @@ def test_a_run_that_fails_takes_its_workers_with_it(tmp_path: Path, undisturbed:
     with Executors() as executors:
         with pytest.raises(KeyboardInterrupt):
             perform(job(tmp_path, LOCAL), progress=Watch(interrupt_after=1), executors=executors)
-        until(lambda: not children())
+        until(lambda: not children_of(os.getpid()))
         found = perform(job(tmp_path, LOCAL), executors=executors)
     assert tables_of(found.run_directory) == tables_of(undisturbed)
 
@@ -157,93 +148,9 @@ def test_a_run_that_fails_takes_its_workers_with_it(tmp_path: Path, undisturbed:
 def test_a_worker_that_dies_between_runs_is_replaced(tmp_path: Path, undisturbed: Path) -> None:
     with Executors() as executors:
         perform(job(tmp_path, LOCAL, seed=1), executors=executors)
-        os.kill(min(children()), signal.SIGKILL)
+        os.kill(min(children_of(os.getpid())), signal.SIGKILL)
         found = perform(job(tmp_path, LOCAL), executors=executors)
     assert tables_of(found.run_directory) == tables_of(undisturbed)
-
-
-# What follows runs in processes of its own.
-
-SCRIPT = """
-import sys
-from pathlib import Path
-from fracctl.execution.perform import perform
-import pytest
-from tests.execution.fakes import fix_identity, job
-
-fix_identity(pytest.MonkeyPatch())
-{body}
-"""
-LONG_RUN = "perform(job(Path({output!r}), {scheduler!r}, seconds=0.3, started={started!r}))"
-
-
-def script(body: str, **values: Any) -> str:
-    return SCRIPT.format(body=body.format(**values))
-
-
-@contextmanager
-def long_run(folder: Path, scheduler: dict[str, Any]) -> Iterator[subprocess.Popen[str]]:
-    """A run of a second and a half in a process of its own, once its first part is stored."""
-    body = script(LONG_RUN, output=str(folder), scheduler=scheduler, started=str(folder / "started"))
-    process = subprocess.Popen([sys.executable, "-c", body], cwd=ROOT, stderr=subprocess.PIPE, text=True)
-    try:
-        until(lambda: bool(list(folder.glob("fake/*/parts/*.parquet"))))
-        yield process
-    finally:
-        process.kill()
-        process.communicate()
-
-
-def until(condition: Callable[[], bool], seconds: float = 20.0) -> None:
-    limit = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < limit
-        time.sleep(0.01)
-
-
-def workers_of(process: subprocess.Popen[str]) -> list[int]:
-    listing = Path(f"/proc/{process.pid}/task").glob("*/children")
-    return [int(pid) for path in listing for pid in path.read_text().split()]
-
-
-def is_running(pid: int) -> bool:
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
-    except FileNotFoundError:
-        return False
-
-
-@pytest.mark.parametrize("scheduler", [LOCAL, {"type": "serial"}], ids=["local", "serial"])
-def test_ctrl_c_ends_a_run_within_a_second(tmp_path: Path, undisturbed: Path, scheduler: dict[str, Any]) -> None:
-    with long_run(tmp_path, scheduler) as process:
-        workers = workers_of(process)
-        started = time.monotonic()
-        process.send_signal(signal.SIGINT)
-        process.wait(timeout=5.0)
-        assert time.monotonic() - started < 1.0
-        assert not any(is_running(pid) for pid in workers)
-        assert process.stderr is not None
-        trace = process.stderr.read()
-    assert trace.count("Traceback") == 1
-    assert trace.rstrip().endswith("KeyboardInterrupt")
-    (directory,) = (tmp_path / "fake").iterdir()
-    assert RunDirectory(directory).status == "interrupted"
-    kept = len(list((directory / "parts").glob("*.parquet")))
-    assert 0 < kept < N_BLOCKS
-    assert tables_of(perform(job(tmp_path)).run_directory) == tables_of(undisturbed)
-    assert f"{kept} were stored" in (directory / "run.log").read_text()
-
-
-def test_a_killed_parent_leaves_no_worker_and_loses_no_part(tmp_path: Path, undisturbed: Path) -> None:
-    with long_run(tmp_path, LOCAL) as process:
-        workers = workers_of(process)
-        assert len(workers) == 2
-        process.kill()
-        process.wait()
-        until(lambda: not any(is_running(pid) for pid in workers), seconds=5.0)
-    finished = perform(job(tmp_path))
-    assert "0 were stored" not in (finished.run_directory / "run.log").read_text()
-    assert tables_of(finished.run_directory) == tables_of(undisturbed)
 
 
 @pytest.mark.parametrize("through", ["file", "argument", "standard input"])

@@ -17,11 +17,9 @@ from fracctl.errors import RunError
 from fracctl.execution.computation import Job
 from fracctl.execution.perform import perform
 from fracctl.store import RunDirectory
-from fracctl.store.lock import exclusive
 from fracctl.surveys import Block
 from fracctl.surveys.base import Rows
 from tests.execution.fakes import N_BLOCKS, N_POINTS, job
-from tests.store.disks import full_after, small_disk
 
 
 class Watch:
@@ -205,18 +203,6 @@ def test_an_interrupted_run_continues(tmp_path: Path, undisturbed: Path, after: 
     assert tables_of(finished.run_directory) == tables_of(undisturbed)
 
 
-def test_a_damaged_part_is_computed_again(tmp_path: Path, undisturbed: Path) -> None:
-    with pytest.raises(KeyboardInterrupt):
-        perform(job(tmp_path), progress=Watch(interrupt_after=N_POINTS))
-    part = next((tmp_path / "fake").glob("*/parts/000000.parquet"))
-    content = bytearray(part.read_bytes())
-    content[len(content) // 2] ^= 1
-    part.write_bytes(bytes(content))
-    finished = perform(job(tmp_path))
-    assert tables_of(finished.run_directory) == tables_of(undisturbed)
-    assert "stored parts that could not be trusted and were computed again: 1" in finished.summary["notes"]
-
-
 def test_progress_counts_every_row(tmp_path: Path) -> None:
     watch = Watch()
     perform(job(tmp_path), progress=watch)
@@ -256,39 +242,6 @@ def test_a_run_without_one_good_point_is_an_error(tmp_path: Path) -> None:
     (directory,) = (tmp_path / "fake").iterdir()
     assert RunDirectory(directory).run_json["error"] == "every point failed: ValueError: the fault was asked for"
     assert perform(job(tmp_path)).summary["status"] == "finished"
-
-
-def test_a_full_disk_loses_nothing(tmp_path: Path, undisturbed: Path) -> None:
-    for n_bytes in (100, 3_000, 60_000, 120_000, 160_000, 250_000):
-        with full_after(n_bytes), pytest.raises(RunError, match=r"cannot write .*: No space left on device; what was"):
-            perform(job(tmp_path))
-    finished = perform(job(tmp_path))
-    (line,) = [text for text in (finished.run_directory / "run.log").read_text().splitlines() if "blocks:" in text][-1:]
-    assert f"{N_BLOCKS} were stored" in line
-    assert tables_of(finished.run_directory) == tables_of(undisturbed)
-
-
-@pytest.mark.parametrize("size", ["16k", "128k", "300k"])
-def test_a_really_full_disk(tmp_path: Path, size: str) -> None:
-    with (
-        small_disk(tmp_path / "disk", size) as disk,
-        pytest.raises(RunError, match="No space left on device; what was computed is kept"),
-    ):
-        perform(job(disk))
-
-
-def test_a_place_that_cannot_be_written_is_one_sentence(tmp_path: Path) -> None:
-    (tmp_path / "file").touch()
-    with pytest.raises(RunError, match=r"cannot write .*file.*Not a directory; output_dir=DIR writes elsewhere"):
-        perform(job(tmp_path / "file"))
-
-
-def test_two_processes_do_not_write_the_same_run(tmp_path: Path) -> None:
-    with pytest.raises(KeyboardInterrupt):
-        perform(job(tmp_path), progress=Watch(interrupt_after=1))
-    (directory,) = (tmp_path / "fake").iterdir()
-    with exclusive(RunDirectory(directory).lock), pytest.raises(RunError, match="another process"):
-        perform(job(tmp_path))
 
 
 def test_the_stored_configuration_is_the_given_one(tmp_path: Path) -> None:

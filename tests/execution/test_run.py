@@ -70,7 +70,7 @@ def test_overrides_may_choose_the_scheduler(tmp_path: Path) -> None:
     axes = ["survey.axes.alpha_w=1.0", "survey.axes.k_p_w=[0.5,1.0]", "survey.axes.k_d_w=[1.0,2.0]"]
     words = [*axes, "figures=[]", f"output_dir={tmp_path}", "scheduler=local", "scheduler.workers=2"]
     run = RunDirectory(fracctl.run("ic1_outofplane", words).run_directory)
-    assert run.run_json["configuration"]["scheduler"] == {"type": "local", "workers": 2}
+    assert run.run_json["configuration"]["scheduler"] == {"type": "local", "workers": 2, "time_limit": None}
 
 
 def test_trajectories_are_those_of_the_optima(result: RunResult) -> None:

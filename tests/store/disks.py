@@ -1,4 +1,4 @@
-"""Disks that are full: a simulated one, and a real one where the system lets us have it."""
+"""Disks that are full or read-only, simulated and, where the system lets us mount them, real; a process that dies."""
 
 from __future__ import annotations
 
@@ -40,6 +40,48 @@ def full_after(n_bytes: int) -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(files, "open_for_writing", open_for_writing)
         yield
+
+
+class Died(BaseException):
+    """The process has been killed."""
+
+
+@contextmanager
+def dies_at(write: int) -> Iterator[None]:
+    """From the given write on, counted from 0, no file is written any more, as if the process had been killed there."""
+    left = [write]
+
+    def open_for_writing(path: Path) -> BinaryIO:
+        left[0] -= 1
+        if left[0] < 0:
+            raise Died
+        return path.open("wb")
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(files, "open_for_writing", open_for_writing)
+        yield
+
+
+@contextmanager
+def read_only() -> Iterator[None]:
+    """No file can be opened for writing meanwhile."""
+
+    def open_for_writing(path: Path) -> BinaryIO:
+        raise OSError(errno.EROFS, os.strerror(errno.EROFS), str(path))
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(files, "open_for_writing", open_for_writing)
+        yield
+
+
+@contextmanager
+def remounted_read_only(disk: Path) -> Iterator[None]:
+    """The file system of `small_disk` is read-only meanwhile."""
+    subprocess.run(["mount", "-o", "remount,ro", disk], check=True)
+    try:
+        yield
+    finally:
+        subprocess.run(["mount", "-o", "remount,rw", disk], check=True)
 
 
 @contextmanager
