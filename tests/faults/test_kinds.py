@@ -22,6 +22,7 @@ from fracctl.execution.worker import Outcome, Work, evaluate
 from fracctl.store import RunDirectory
 from fracctl.surveys import Block
 from tests.comparison.test_comparison import FEW
+from tests.configs.test_files import TINY_DESIGN, TINY_FLIGHT
 from tests.faults.processes import ROOT, parts_in
 
 SEARCH = [
@@ -61,12 +62,14 @@ KINDS = {
         "survey.axes.recall=[0,0.3]",
     ],
     "memory": ["experiment=tether", *TETHER],
+    "flight": ["experiment=flight_ic1", *TINY_FLIGHT],
+    "robust": ["experiment=flight_design", *TINY_DESIGN, "survey.starts=8"],
     "memory, dispersed": ["experiment=tether_monte_carlo", *TETHER, "evaluation.samples=3"],
 }
 SLOW = {"comparison", "nsga2", "cma_es", "single", "lqr_seed", "accuracy", "memory, dispersed"}
 """Kinds that take long, or that others stand for."""
 
-ONE_BLOCK = {"single", "lqr_seed", "delayed", "memory, dispersed"}
+ONE_BLOCK = {"single", "lqr_seed", "delayed", "memory, dispersed", "flight"}
 
 _KILLED = """
 import os, signal, sys
