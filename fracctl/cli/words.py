@@ -175,6 +175,8 @@ def _survey(config: RunConfig, evaluation: Evaluation, survey: Survey) -> Iterat
 def _scheduler(config: RunConfig) -> str:
     if config.scheduler.type == "serial":
         return "serial: in this process"
+    if address := getattr(config.scheduler, "address", None):
+        return f"dask: the workers of {address}"
     workers = getattr(config.scheduler, "workers", None)
     return f"{config.scheduler.type}: {workers or 'as many worker processes as cores'}"
 

@@ -10,6 +10,7 @@ from pydantic import AfterValidator, Field, PlainValidator, SerializeAsAny, Vali
 from pydantic_core import InitErrorDetails
 
 from fracctl.config import parts
+from fracctl.config.cluster import DaskScheduler
 from fracctl.config.evaluations import (
     AccuracyEvaluation,
     ComparisonEvaluation,
@@ -103,7 +104,11 @@ EVALUATIONS: Mapping[str, type[Typed]] = {
     "delayed": DelayedEvaluation,
     "memory": MemoryEvaluation,
 }
-SCHEDULERS: Mapping[str, type[Typed]] = {"serial": SerialScheduler, "local": LocalScheduler}
+SCHEDULERS: Mapping[str, type[Typed]] = {
+    "serial": SerialScheduler,
+    "local": LocalScheduler,
+    "dask": DaskScheduler,
+}
 
 
 def _survey(value: Any, info: ValidationInfo) -> Typed:

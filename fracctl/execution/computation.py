@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import Executor
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import Any
@@ -16,7 +15,7 @@ from fracctl.errors import RunError
 from fracctl.evaluation import COUNTERS, Conclusion
 from fracctl.execution.cross_check import CrossCheck
 from fracctl.execution.drawing import draw_figures
-from fracctl.execution.executors import Executors, n_workers
+from fracctl.execution.executors import Executors
 from fracctl.execution.frequency_response import frequency_responses
 from fracctl.execution.poles import COLUMNS as POLE_COLUMNS
 from fracctl.execution.poles import Poles
@@ -29,6 +28,7 @@ from fracctl.execution.summary import Tally, notes_on, plain_tables, results, su
 from fracctl.execution.tails import notes_on_tails
 from fracctl.execution.trajectories import trajectories
 from fracctl.execution.worker import Work, describe
+from fracctl.execution.workers import WorkerExecutor
 from fracctl.store.columns import schema
 from fracctl.store.files import remove_tree
 from fracctl.store.identity import canonical_json
@@ -69,9 +69,8 @@ class Computation:
         self._evaluation = job.work.evaluation()
         self._survey = job.survey()
         self._scheduler = job.configuration["scheduler"]
-        self._workers = n_workers(self._scheduler, self._survey.n_points)
         directory.create()
-        self._record = Record(directory, job.configuration, self._workers)
+        self._record = Record(directory, job.configuration)
         self._metadata = {
             "fracctl.configuration": canonical_json(job.configuration),
             "fracctl.provenance": canonical_json(self._record.provenance),
@@ -92,6 +91,7 @@ class Computation:
             self._record.write("running")
             lent = self._executors.lent(self._scheduler, self._survey.n_points)
             with run_log(self._directory.log), lent as executor:
+                self._record.provenance["workers"] = executor.workers
                 summary = self._compute(executor)
             self._record.write(summary["status"], summary, summary["error"])
             self._directory.write_manifest()
@@ -112,7 +112,7 @@ class Computation:
                     self._record.write("failed", error=describe(problem))
             raise
 
-    def _compute(self, executor: Executor) -> dict[str, Any]:
+    def _compute(self, executor: WorkerExecutor) -> dict[str, Any]:
         """Evaluate and conclude; workers check rows by another solver while this process writes and draws."""
         store = self._evaluate(executor)
         work, seed = self._job.work, int(self._job.configuration["seed"])
@@ -138,12 +138,11 @@ class Computation:
         tables = {"tables": plain_tables(conclusion.shown)} if conclusion.shown else {}
         return summarise(identity, store, found, notes) | tables | check.summary() | poles.summary()
 
-    def _evaluate(self, executor: Executor) -> RowStore:
+    def _evaluate(self, executor: WorkerExecutor) -> RowStore:
         store = RowStore(self._directory, self._evaluation, self._evaluations_schema)
-        in_flight = 2 * self._workers if self._workers > 1 else 1
-        scheduler = Scheduler(self._survey, executor, self._job.work, store, in_flight, self._progress.advance)
+        scheduler = Scheduler(self._survey, executor, self._job.work, store, self._progress.advance)
         versions = self._record.provenance["versions"]
-        _log.info("fracctl %s, %s, workers: %d", versions["fracctl"], self._scheduler["type"], self._workers)
+        _log.info("fracctl %s, %s, workers: %d", versions["fracctl"], self._scheduler["type"], executor.workers)
         self._progress.start(self._survey.n_points)
         try:
             scheduler.run()

@@ -5,12 +5,12 @@ from __future__ import annotations
 import logging
 from collections import Counter, deque
 from collections.abc import Callable
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
+from concurrent.futures import FIRST_COMPLETED, Future, wait
 from typing import Protocol
 
 from fracctl.errors import RunError
-from fracctl.execution.processes import WorkerLost
 from fracctl.execution.worker import Outcome, Work, describe, evaluate
+from fracctl.execution.workers import WorkerExecutor, WorkerLost
 from fracctl.surveys import Block, Survey
 from fracctl.surveys.base import Rows
 
@@ -35,33 +35,31 @@ class BlockStore(Protocol):
 class Scheduler:
     """Runs a survey to its end.
 
-    At most `in_flight` blocks are submitted at a time. A block whose worker dies is submitted again, `ATTEMPTS` times
-    in all; any other failure is final for this run.
+    As many blocks are submitted at a time as the executor has in flight. A block whose worker dies is submitted again,
+    `ATTEMPTS` times in all; any other failure is final for this run.
 
     Args:
         survey: what is asked and told.
         executor: where blocks run; it is shut down at Ctrl-C.
         work: the evaluation.
         store: keeps the rows of finished blocks, and answers for those it has.
-        in_flight: how many blocks are submitted at a time.
         advance: called with the number of points of each block that is stored.
 
     Raises:
-        RunError: workers die one after the other, or the store cannot be written.
+        RunError: workers die one after the other, the executor has none left, or the store cannot be written.
         KeyboardInterrupt: Ctrl-C; blocks that were done by then are stored, all others are abandoned at once.
     """
 
     def __init__(
         self,
         survey: Survey,
-        executor: Executor,
+        executor: WorkerExecutor,
         work: Work,
         store: BlockStore,
-        in_flight: int,
         advance: Callable[[int], None],
     ) -> None:
         self._survey, self._executor, self._work, self._store = survey, executor, work, store
-        self._in_flight, self._advance = in_flight, advance
+        self._advance = advance
         self._queue: deque[Block] = deque()
         self._pending: dict[Future[Outcome], Block] = {}
         self._attempts: Counter[int] = Counter()
@@ -79,7 +77,7 @@ class Scheduler:
             raise
 
     def _submit(self) -> None:
-        while len(self._pending) < self._in_flight:
+        while len(self._pending) < self._executor.in_flight:
             block = self._next()
             if block is None:
                 return
@@ -115,13 +113,15 @@ class Scheduler:
         except WorkerLost as problem:
             self._attempts[block.number] += 1
             self._lost_in_a_row += 1
-            if self._lost_in_a_row > ATTEMPTS * self._in_flight:
+            if self._lost_in_a_row > ATTEMPTS * self._executor.in_flight:
                 raise RunError(f"worker processes keep ending: {problem}; scheduler=serial does without") from None
             if self._attempts[block.number] < ATTEMPTS:
                 _log.warning("block %d is tried again: %s", block.number, problem)
                 self._queue.appendleft(block)
                 return
             outcome = Outcome(None, str(problem))
+        except RunError:
+            raise
         except Exception as problem:  # noqa: BLE001 - becomes rows with their reason
             outcome = Outcome(None, describe(problem))
         self._tell(block, self._store.save(block, outcome))
