@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
+import pickle
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
-from typing import Any, TypeVar
+from typing import Any
 
 from fracctl.execution.threads import single_threaded
 from fracctl.store.identity import sources_digest
-
-_T = TypeVar("_T")
 
 Program = Mapping[str, str]
 """Versions by name, and the digest of the sources of fracctl."""
@@ -46,20 +45,38 @@ def difference(here: Program, there: Program) -> str | None:
     return None
 
 
-def call(expected: Program, function: Callable[..., _T], args: Sequence[Any], kwargs: Mapping[str, Any]) -> _T:
-    """Call a function with one thread in the linear algebra libraries.
+def identify() -> tuple[dict[str, str], str]:
+    """Return `program` and the kind of processor; last bits may differ between kinds."""
+    from llvmlite.binding import get_host_cpu_name
+
+    return program(), str(get_host_cpu_name())
+
+
+def packed(function: Callable[..., Any], args: Sequence[Any], kwargs: Mapping[str, Any]) -> bytes:
+    """Return a call of an importable function as `answer` takes it."""
+    return pickle.dumps((program(), pickle.dumps((function, args, kwargs), pickle.HIGHEST_PROTOCOL)))
+
+
+def answer(request: bytes) -> bytes:
+    """Do a packed call, with one thread in the linear algebra libraries, and return its pickled result.
+
+    Dask would ask for a result that cannot be sent again and again.
 
     Raises:
-        OtherProgram: this worker, which may have joined late, is not what was expected.
+        OtherProgram: this worker, which may have joined late, is not what the call was packed for.
     """
+    expected, content = pickle.loads(request)
     if found := difference(expected, program()):
         raise OtherProgram(found)
+    function, args, kwargs = pickle.loads(content)
     with single_threaded():
-        return function(*args, **kwargs)
+        result = function(*args, **kwargs)
+    return pickle.dumps(result, pickle.HIGHEST_PROTOCOL)
 
 
-def processor() -> str:
-    """Return the kind of processor; kernels and products may differ in their last bits between kinds."""
-    from llvmlite.binding import get_host_cpu_name  # type: ignore[import-untyped]
-
-    return str(get_host_cpu_name())
+_THIS = "__import__('fracctl.execution.dask_call', fromlist=['answer'])"
+IDENTIFY = f"{_THIS}.identify()"
+"""What Dask has a worker evaluate. Plain text: scheduler and workers that lack fracctl must get it in their hands, for
+they end at a message that they cannot read."""
+ANSWER = f"{_THIS}.answer(request)"
+"""The same, where `request` is a packed call."""

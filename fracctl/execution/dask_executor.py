@@ -7,6 +7,7 @@ here, as in processes of this machine.
 from __future__ import annotations
 
 import logging
+import pickle
 import threading
 import time
 from collections.abc import Callable, Mapping
@@ -17,7 +18,7 @@ from typing import Any, ParamSpec, TypeVar
 
 from fracctl.config.cluster import TLS_FILES
 from fracctl.errors import ConfigurationError, RunError
-from fracctl.execution.dask_call import OtherProgram, call, difference, processor, program
+from fracctl.execution.dask_call import ANSWER, IDENTIFY, OtherProgram, difference, identify, packed, program
 from fracctl.execution.dask_cluster import LocalCluster
 from fracctl.execution.workers import WorkerError, WorkerExecutor, WorkerLost
 
@@ -94,7 +95,7 @@ class DaskExecutor(WorkerExecutor):
         with self._lock:
             self._pending.add(outer)
         try:
-            inner = self._inner.submit(call, program(), fn, args, kwargs)
+            inner = self._inner.submit(eval, ANSWER, {"request": packed(fn, args, kwargs)})
         except Exception as problem:  # noqa: BLE001 - an executor hands every exception to its future
             self._fail(outer, RunError(f"the Dask scheduler at {self._address} is lost ({problem}); {_KEPT}"))
             return outer
@@ -121,7 +122,7 @@ class DaskExecutor(WorkerExecutor):
             return client(self._address, timeout=self._patience_s)
         except Exception as problem:
             raise RunError(
-                f"no Dask scheduler answers at {self._address} ({_root(problem)}); start one by 'dask scheduler', "
+                f"no Dask scheduler answers at {self._address} ({_described(problem)}); start one by 'dask scheduler', "
                 "and name the address that it prints as scheduler.address"
             ) from problem
 
@@ -140,18 +141,16 @@ class DaskExecutor(WorkerExecutor):
 
     def _check_workers(self) -> None:
         """Have every worker say what it is before anything is computed."""
-        names = sorted(self._client.nthreads())
-        asked = {name: self._client.submit(_identify, workers=[name], pure=False) for name in names}
-        kinds: dict[str, str] = {}
-        for name, future in asked.items():
-            try:
-                found, kinds[name] = future.result(timeout=self._patience_s)
-            except Exception as problem:
-                raise RunError(f"the Dask worker {name} cannot load fracctl ({_root(problem)}); {_CURE}") from problem
+        kinds = {identify()[1]}
+        for name, answer in self._client.run(eval, IDENTIFY, on_error="return").items():
+            if isinstance(answer, BaseException):
+                raise RunError(f"the Dask worker {name} cannot load fracctl ({_described(answer)}); {_CURE}")
+            found, kind = answer
             if words := difference(program(), found):
                 raise RunError(f"the Dask worker {name} has {words}, so its numbers may differ; {_CURE}")
-        if len(set(kinds.values()) | {processor()}) > 1:
-            _log.warning("processors differ (%s): last digits may, too", ", ".join(sorted({*kinds.values()})))
+            kinds.add(kind)
+        if len(kinds) > 1:
+            _log.warning("processors differ (%s): the last digits of a row may, too", ", ".join(sorted(kinds)))
 
     def _hand_over(self, outer: Future[Any], inner: Future[Any]) -> None:
         """Give the outcome of Dask's future to ours, in the words of an executor."""
@@ -162,13 +161,14 @@ class DaskExecutor(WorkerExecutor):
             return
         problem = inner.exception()
         if problem is None:
-            self._settle(outer, inner.result())
+            self._settle(outer, pickle.loads(inner.result()))
         elif isinstance(problem, KilledWorker):
             self._has_lost = True
             deaths = problem.allowed_failures + 1
             self._fail(outer, WorkerLost(f"its worker process died{f', {deaths} in a row' if deaths > 1 else ''}"))
-        elif isinstance(problem, OtherProgram):
-            self._fail(outer, RunError(f"a Dask worker that has joined has {problem}; {_CURE}; {_KEPT}"))
+        elif isinstance(problem, OtherProgram | ImportError):
+            reason = f"has {problem}" if isinstance(problem, OtherProgram) else f"cannot load fracctl ({problem})"
+            self._fail(outer, RunError(f"a Dask worker that has joined {reason}; {_CURE}; {_KEPT}"))
         else:
             self._fail(outer, WorkerError(f"{type(problem).__name__}: {problem}"))
 
@@ -208,12 +208,8 @@ class DaskExecutor(WorkerExecutor):
 _CURE = "install the same packages there as here"
 
 
-def _identify() -> tuple[dict[str, str], str]:
-    return program(), processor()
-
-
-def _root(problem: BaseException) -> str:
-    """Return the first cause of an exception in one line."""
+def _described(problem: BaseException) -> str:
+    """Return an exception, or what caused it in the first place, in one line."""
     while problem.__cause__ is not None:
         problem = problem.__cause__
-    return f"{type(problem).__name__}: {problem}".splitlines()[0]
+    return f"{type(problem).__name__}: {problem}".splitlines()[0].rstrip(": ")

@@ -103,7 +103,7 @@ def test_all_errors_come_at_once() -> None:
         (["scheduler=local", "scheduler.workers=0"], "scheduler.workers = 0: must be at least 1"),
         (["scheduler=local", "scheduler.workers=1.5"], "scheduler.workers = 1.5: must be a whole number"),
         (["scheduler.workers=2"], "unknown key 'scheduler.workers'; allowed: type"),
-        (["scheduler.type=lokal"], "scheduler.type = lokal: must be one of serial, local; did you mean 'local'?"),
+        (["scheduler.type=lokal"], "scheduler.type = lokal: must be one of serial, local, dask; did you mean 'local'?"),
         (["figures.a.type=pie"], f"figures.a.type = pie: must be {', '.join(FIGURES[:-1])} or {FIGURES[-1]}"),
         (["figures.trajectories.objective=fast"], ("figures.trajectories.objective = fast: must be one of the run's "
          "objectives (settling_time, st_os_u)")),
