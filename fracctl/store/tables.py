@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -32,25 +32,35 @@ def deserialise(content: bytes) -> pa.Table:
     return pq.read_table(pa.BufferReader(content), page_checksum_verification=True)
 
 
-def write(path: Path, schema: pa.Schema, tables: Iterable[pa.Table]) -> None:
-    """Write tables that follow each other to one file, atomically and without holding them all."""
+@contextmanager
+def writing(path: Path, schema: pa.Schema) -> Iterator[Callable[[pa.Table], None]]:
+    """Yield what takes tables that follow each other; the file is there when all of them are, or not at all."""
     with (
         atomic(path) as file,
         pq.ParquetWriter(file, schema, compression=_COMPRESSION, write_page_checksum=True) as writer,
     ):
-        for group in _groups(tables):
+        waiting: list[pa.Table] = []
+
+        def write_group() -> None:
+            group = pa.concat_tables(waiting).combine_chunks()
+            waiting.clear()
             writer.write_table(group.replace_schema_metadata(schema.metadata))
 
+        def take(table: pa.Table) -> None:
+            waiting.append(table)
+            if sum(part.num_rows for part in waiting) >= ROWS_IN_GROUP:
+                write_group()
 
-def _groups(tables: Iterable[pa.Table]) -> Iterator[pa.Table]:
-    waiting: list[pa.Table] = []
-    for table in tables:
-        waiting.append(table)
-        if sum(part.num_rows for part in waiting) >= ROWS_IN_GROUP:
-            yield pa.concat_tables(waiting).combine_chunks()
-            waiting = []
-    if waiting:
-        yield pa.concat_tables(waiting).combine_chunks()
+        yield take
+        if waiting:
+            write_group()
+
+
+def write(path: Path, schema: pa.Schema, tables: Iterable[pa.Table]) -> None:
+    """Write tables that follow each other to one file, atomically and without holding them all."""
+    with writing(path, schema) as take:
+        for table in tables:
+            take(table)
 
 
 def read(path: Path, columns: list[str] | None = None) -> pa.Table:
@@ -71,11 +81,17 @@ def _read_errors(path: Path) -> Iterator[None]:
         raise RunError(f"cannot read {path}: {problem}") from problem
 
 
-def stream(path: Path) -> Iterator[pa.Table]:
+def stream(path: Path, columns: list[str] | None = None) -> Iterator[pa.Table]:
     """Read a file row group by row group, verifying every page."""
     with _read_errors(path), pq.ParquetFile(path, page_checksum_verification=True) as file:
         for number in range(file.num_row_groups):
-            yield file.read_row_group(number)
+            yield file.read_row_group(number, columns)
+
+
+def columns(path: Path) -> tuple[str, ...]:
+    """Return the names of a file's columns."""
+    with _read_errors(path):
+        return tuple(pq.read_schema(path).names)
 
 
 def to_pandas(table: pa.Table) -> pd.DataFrame:

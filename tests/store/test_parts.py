@@ -150,7 +150,9 @@ def test_parts_are_joined_in_order_and_large_groups(tmp_path: Path) -> None:
     for number in (2, 0, 1):
         parts.save(number, rows(100 * number))
     run = RunDirectory(tmp_path)
-    run.write_evaluations(SCHEMA, parts.tables([0, 1, 2]))
+    with run.writing_evaluations(SCHEMA) as take:
+        for table in parts.tables([0, 1, 2]):
+            take(table)
     assert run.evaluations(["point"])["point"].tolist() == [first + i for first in (0, 100, 200) for i in range(50)]
     assert pq.ParquetFile(run.evaluations_path).num_row_groups == 1
     assert pq.read_schema(run.evaluations_path).metadata[b"fracctl.configuration"] == b"{}"
@@ -165,8 +167,12 @@ def test_a_full_disk_while_joining(tmp_path: Path) -> None:
     parts = Parts(tmp_path / "parts", SCHEMA)
     parts.save(0, rows())
     run = RunDirectory(tmp_path)
-    with full_after(500), pytest.raises(RunError, match=r"evaluations.parquet: No space left on device"):
-        run.write_evaluations(SCHEMA, parts.tables([0]))
+    with (
+        full_after(500),
+        pytest.raises(RunError, match=r"evaluations.parquet: No space left on device"),
+        run.writing_evaluations(SCHEMA) as take,
+    ):
+        take(next(parts.tables([0])))
     assert not run.evaluations_path.exists()
 
 
