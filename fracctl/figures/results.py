@@ -102,7 +102,7 @@ class Results:
         """Design variables, the slices' apart, of which the table holds more than one value."""
         axes = self.configuration["survey"].get("axes", {})
         names = [name for name in axes if name != self.slice_variable]
-        return tuple(name for name in names if self.run.evaluations([name])[name].nunique() > 1)
+        return tuple(name for name in names if self.run.varies(name))
 
     @property
     def horizon_periods(self) -> float:

@@ -8,6 +8,7 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 import pyarrow as pa
 import pyarrow.compute as pc
@@ -90,6 +91,17 @@ class RunDirectory:
         """Yield every evaluated point, piece by piece, as arrays."""
         for table in tables.stream(self.evaluations_path):
             yield to_rows(table)
+
+    def varies(self, column: str) -> bool:
+        """Return whether the evaluated points have more than one value in a column of numbers."""
+        known = np.zeros(0)
+        for table in tables.stream(self.evaluations_path, [column]):
+            values = table.column(column).to_numpy()
+            values = values[~np.isnan(values)]
+            known = known if known.size else values[:1]
+            if np.any(values != known):
+                return True
+        return False
 
     def evaluations_where(self, wanted: Mapping[str, Sequence[Any]], columns: Sequence[str]) -> pd.DataFrame:
         """Return some columns of the points whose columns have one of the `wanted` values; only those are held."""

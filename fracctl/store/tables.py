@@ -54,6 +54,7 @@ def writing(path: Path, schema: pa.Schema) -> Iterator[Callable[[pa.Table], None
         yield take
         if waiting:
             write_group()
+    _give_back()
 
 
 def write(path: Path, schema: pa.Schema, tables: Iterable[pa.Table]) -> None:
@@ -81,11 +82,17 @@ def _read_errors(path: Path) -> Iterator[None]:
         raise RunError(f"cannot read {path}: {problem}") from problem
 
 
+def _give_back() -> None:
+    """Return what Arrow has kept for further tables to the system."""
+    pa.default_memory_pool().release_unused()
+
+
 def stream(path: Path, columns: list[str] | None = None) -> Iterator[pa.Table]:
     """Read a file row group by row group, verifying every page."""
     with _read_errors(path), pq.ParquetFile(path, page_checksum_verification=True) as file:
         for number in range(file.num_row_groups):
-            yield file.read_row_group(number, columns)
+            yield file.read_row_group(number, columns, use_threads=False)  # each thread would keep memory of its own
+    _give_back()
 
 
 def columns(path: Path) -> tuple[str, ...]:
