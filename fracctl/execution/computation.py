@@ -146,7 +146,7 @@ class Computation:
     def _evaluate(self, executor: WorkerExecutor, gathering: Gathering) -> RowStore:
         """Take the survey through the executor; rows are stored and gathered while workers compute the next."""
         store = RowStore(self._directory, self._evaluation, self._evaluations_schema, gathering.take)
-        scheduler = Scheduler(self._survey, executor, self._job.work, store, self._progress.advance)
+        scheduler = Scheduler(self._survey, executor, self._job.work, store, self._progress)
         versions = self._record.provenance["versions"]
         _log.info("fracctl %s, %s, workers: %d", versions["fracctl"], self._scheduler["type"], executor.workers)
         self._progress.start(self._survey.n_points)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import logging
 from collections import Counter, deque
-from collections.abc import Callable
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from typing import Protocol
 
 from fracctl.errors import RunError
+from fracctl.execution.progress import Progress
 from fracctl.execution.worker import Outcome, Work, describe, evaluate
 from fracctl.execution.workers import WorkerExecutor, WorkerLost
 from fracctl.surveys import Block, Survey
@@ -43,7 +43,7 @@ class Scheduler:
         executor: where blocks run; it is shut down at Ctrl-C.
         work: the evaluation.
         store: keeps the rows of finished blocks, and answers for those it has.
-        advance: called with the number of points of each block that is stored.
+        progress: is told of every block that is stored.
 
     Raises:
         RunError: workers die one after the other, the executor has none left, or the store cannot be written.
@@ -56,10 +56,10 @@ class Scheduler:
         executor: WorkerExecutor,
         work: Work,
         store: BlockStore,
-        advance: Callable[[int], None],
+        progress: Progress,
     ) -> None:
         self._survey, self._executor, self._work, self._store = survey, executor, work, store
-        self._advance = advance
+        self._progress = progress
         self._queue: deque[Block] = deque()
         self._pending: dict[Future[Outcome], Block] = {}
         self._attempts: Counter[int] = Counter()
@@ -94,7 +94,8 @@ class Scheduler:
             rows = self._store.load(block)
             if rows is None:
                 return block
-            self._tell(block, rows)
+            self._survey.tell(block.number, rows)
+            self._progress.found(block.size)
 
     def _collect(self) -> None:
         if not self._pending:
@@ -124,11 +125,8 @@ class Scheduler:
             raise
         except Exception as problem:  # noqa: BLE001 - becomes rows with their reason
             outcome = Outcome(None, describe(problem))
-        self._tell(block, self._store.save(block, outcome))
-
-    def _tell(self, block: Block, rows: Rows) -> None:
-        self._survey.tell(block.number, rows)
-        self._advance(block.size)
+        self._survey.tell(block.number, self._store.save(block, outcome))
+        self._progress.advance(block.size)
 
     def _keep_what_is_done(self) -> None:
         for future, block in self._pending.items():

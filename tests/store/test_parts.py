@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
@@ -186,3 +187,19 @@ def test_a_table_that_cannot_be_read_is_one_sentence(tmp_path: Path) -> None:
     run.optima_path.write_bytes(bytes(content))
     with pytest.raises(RunError, match=r"cannot read .*optima.parquet"):
         run.optima()
+
+
+def test_some_points_and_columns_of_a_table(tmp_path: Path) -> None:
+    run = RunDirectory(tmp_path)
+    with run.writing_evaluations(SCHEMA) as take:
+        for first in (0, 100, 200):
+            take(columns.to_table(rows(first), SCHEMA))
+    whole = run.evaluations()
+    assert run.evaluations_columns == tuple(whole.columns)
+    wanted = whole["alpha_w"].unique()[:2].tolist()
+    found = run.evaluations_where({"alpha_w": wanted, "status": ["ok"]}, ["alpha_w", "status", "point"])
+    expected = whole[whole["alpha_w"].isin(wanted) & (whole["status"] == "ok")][["alpha_w", "status", "point"]]
+    pd.testing.assert_frame_equal(found, expected.reset_index(drop=True))
+    assert {name: run.varies(name) for name in ("point", "alpha_w")} == {
+        name: whole[name].nunique() > 1 for name in ("point", "alpha_w")
+    }
