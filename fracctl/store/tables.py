@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 import pyarrow as pa
@@ -19,10 +20,16 @@ ROWS_IN_GROUP = 65_536
 _COMPRESSION = "zstd"
 
 
+def _options(schema: pa.Schema) -> dict[str, Any]:
+    """How tables are written. Dictionaries of words only: those of numbers take three times as long, and more room."""
+    words = [field.name for field in schema if field.type == pa.string()]
+    return {"compression": _COMPRESSION, "write_page_checksum": True, "use_dictionary": words or False}
+
+
 def serialise(table: pa.Table) -> bytes:
     """Return a table as the bytes of a Parquet file."""
     sink = pa.BufferOutputStream()
-    pq.write_table(table, sink, compression=_COMPRESSION, write_page_checksum=True)
+    pq.write_table(table, sink, **_options(table.schema))
     content: bytes = sink.getvalue().to_pybytes()
     return content
 
@@ -37,7 +44,7 @@ def writing(path: Path, schema: pa.Schema) -> Iterator[Callable[[pa.Table], None
     """Yield what takes tables that follow each other; the file is there when all of them are, or not at all."""
     with (
         atomic(path) as file,
-        pq.ParquetWriter(file, schema, compression=_COMPRESSION, write_page_checksum=True) as writer,
+        pq.ParquetWriter(file, schema, **_options(schema)) as writer,
     ):
         waiting: list[pa.Table] = []
 
