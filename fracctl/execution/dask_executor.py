@@ -65,9 +65,7 @@ class DaskExecutor(WorkerExecutor):
                 address = cluster.address
             self._address: str = address
             self._open.enter_context(silence_logging_cmgr(logging.CRITICAL))
-            files = {name: scheduler[name] for name in TLS_FILES if scheduler[name] is not None}
-            security = Security(require_encryption=True, **files) if files else None  # type: ignore[no-untyped-call]
-            self._client = self._connected(partial(Client, security=security, set_as_default=False))
+            self._client = self._connected(Client, self._security(scheduler, Security))
             self._open.callback(self._client.close, timeout=1)
             self._wait_for_workers(scheduler["workers"] if scheduler["address"] is None else None)
             self._check_workers()
@@ -117,9 +115,26 @@ class DaskExecutor(WorkerExecutor):
         self._watch.join()
         self._open.close()
 
-    def _connected(self, client: Callable[..., Any]) -> Any:
+    def _security(self, scheduler: Mapping[str, Any], security: Callable[..., Any]) -> Any:
+        """Return what Dask needs for TLS: the files that were named, else those of its own configuration."""
+        files = {name: scheduler[name] for name in TLS_FILES if scheduler[name] is not None}
+        made = security(require_encryption=True, **files) if files else security()
         try:
-            return client(self._address, timeout=self._patience_s)
+            context = made.get_connection_args("client").get("ssl_context")
+        except OSError as problem:
+            raise ConfigurationError(
+                f"{', '.join(files.values())}: no certificates and key for TLS ({problem}); PEM files are needed"
+            ) from problem
+        if context is None and self._address.startswith("tls://"):
+            raise ConfigurationError(
+                f"{self._address} needs certificates: give scheduler.tls_ca_file, scheduler.tls_client_cert and "
+                "scheduler.tls_client_key, or Dask's own settings distributed.comm.tls"
+            )
+        return made
+
+    def _connected(self, client: Callable[..., Any], security: Any) -> Any:
+        try:
+            return client(self._address, timeout=self._patience_s, security=security, set_as_default=False)
         except Exception as problem:
             raise RunError(
                 f"no Dask scheduler answers at {self._address} ({_described(problem)}); start one by 'dask scheduler', "

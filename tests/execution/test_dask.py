@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -64,15 +66,19 @@ def started(*arguments: str) -> Iterator[subprocess.Popen[bytes]]:
         process.wait()
 
 
+@contextmanager
+def scheduler(contact: Path, host: str, *further: str) -> Iterator[str]:
+    """A scheduler; yields its address."""
+    place = ("--host", host, "--port", "0", "--scheduler-file", str(contact))
+    with started("scheduler", *place, *further):
+        until(lambda: contact.exists() and contact.read_text().strip().endswith("}"), seconds=60.0)
+        yield str(json.loads(contact.read_text())["address"])
+
+
 @pytest.fixture(scope="module")
 def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """Address of a scheduler."""
-    contact = tmp_path_factory.mktemp("dask") / "scheduler.json"
-    with started("scheduler", "--host", "127.0.0.1", "--port", "0", "--scheduler-file", str(contact)):
-        import json
-
-        until(lambda: contact.exists() and contact.read_text().strip().endswith("}"))
-        yield str(json.loads(contact.read_text())["address"])
+    with scheduler(tmp_path_factory.mktemp("dask") / "scheduler.json", "127.0.0.1") as found:
+        yield found
 
 
 @contextmanager
@@ -86,7 +92,7 @@ def wait_for(address: str, count: int) -> None:
     from distributed import Client
 
     with Client(address, set_as_default=False) as client:
-        until(lambda: len(client.nthreads()) == count)
+        until(lambda: len(client.nthreads()) == count, seconds=60.0)
 
 
 @pytest.fixture
@@ -278,6 +284,27 @@ def test_workers_that_do_not_fit(
         with pytest.raises(RunError, match=sentence):
             make_executor(options(address), n_points=None)
         assert process.poll() is None, "a worker that does not fit stays for others"
+
+
+@pytest.mark.skipif(shutil.which("openssl") is None, reason="certificates are made by openssl")
+def test_tls(tmp_path: Path, undisturbed: Path) -> None:
+    certificate, key, junk = (str(tmp_path / name) for name in ("own.pem", "own.key", "junk.pem"))
+    make = ["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "2", "-subj", "/CN=127.0.0.1"]
+    alternative = ["-addext", "subjectAltName=IP:127.0.0.1", "-keyout", key, "-out", certificate]
+    subprocess.run([*make, *alternative], check=True, capture_output=True)
+    Path(junk).write_text("junk")
+    files = {"tls_ca_file": certificate, "tls_client_cert": certificate, "tls_client_key": key}
+    tls = ("--tls-ca-file", certificate, "--tls-cert", certificate, "--tls-key", key)
+    with scheduler(tmp_path / "scheduler.json", "tls://127.0.0.1", *tls) as address:
+        assert address.startswith("tls://")
+        with pytest.raises(ConfigurationError, match=r"needs certificates: give scheduler\.tls_ca_file"):
+            make_executor(options(address), n_points=None)
+        with pytest.raises(ConfigurationError, match=r"no certificates and key for TLS .*; PEM files are needed"):
+            make_executor(options(address, **files | {"tls_ca_file": junk}), n_points=None)
+        with pytest.raises(RunError, match=f"no Dask scheduler answers at tcp://{address[6:]}"):
+            make_executor(options(f"tcp://{address[6:]}", patience_s=1.0), n_points=None)
+        with worker(address, tmp_path, *tls):
+            check(perform(job(tmp_path, options(address, **files))), undisturbed)
 
 
 def test_nothing_loads_dask_unless_asked() -> None:
