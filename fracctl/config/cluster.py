@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
@@ -57,8 +56,6 @@ class DaskScheduler(Typed):
         for name, path in given.items():
             if not (self.address or "").startswith("tls://"):
                 yield refusal((name,), path, "goes with scheduler.address=tls://HOST:PORT only")
-            elif not Path(path).is_file():
-                yield refusal((name,), path, "must name a file, and there is none")
         for name in files:
             if given and name not in given:
                 yield refusal((name,), None, f"must be given where {next(iter(given))} is")

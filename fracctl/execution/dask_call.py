@@ -8,6 +8,8 @@ from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
+from threadpoolctl import threadpool_info  # type: ignore[import-untyped]
+
 from fracctl.execution.threads import single_threaded
 from fracctl.store.identity import sources_digest
 
@@ -46,10 +48,9 @@ def difference(here: Program, there: Program) -> str | None:
 
 
 def identify() -> tuple[dict[str, str], str]:
-    """Return `program` and the kind of processor; last bits may differ between kinds."""
-    from llvmlite.binding import get_host_cpu_name
-
-    return program(), str(get_host_cpu_name())
+    """Return `program`, and the kinds of processor that the linear algebra libraries were loaded for."""
+    kinds = {str(library["architecture"]) for library in threadpool_info() if library.get("architecture")}
+    return program(), ", ".join(sorted(kinds))
 
 
 def packed(function: Callable[..., Any], args: Sequence[Any], kwargs: Mapping[str, Any]) -> bytes:

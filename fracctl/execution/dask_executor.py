@@ -165,7 +165,7 @@ class DaskExecutor(WorkerExecutor):
                 raise RunError(f"the Dask worker {name} has {words}, so its numbers may differ; {_CURE}")
             kinds.add(kind)
         if len(kinds) > 1:
-            _log.warning("processors differ (%s): the last digits of a row may, too", ", ".join(sorted(kinds)))
+            _log.warning("processors differ (%s): the last digits of a row may, too", "; ".join(sorted(kinds)))
 
     def _hand_over(self, outer: Future[Any], inner: Future[Any]) -> None:
         """Give the outcome of Dask's future to ours, in the words of an executor."""

@@ -301,6 +301,8 @@ def test_tls(tmp_path: Path, undisturbed: Path) -> None:
             make_executor(options(address), n_points=None)
         with pytest.raises(ConfigurationError, match=r"no certificates and key for TLS .*; PEM files are needed"):
             make_executor(options(address, **files | {"tls_ca_file": junk}), n_points=None)
+        with pytest.raises(ConfigurationError, match=r"none\.pem.*: no certificates and key for TLS .*No such file"):
+            make_executor(options(address, **files | {"tls_client_key": str(tmp_path / "none.pem")}), n_points=None)
         with pytest.raises(RunError, match=f"no Dask scheduler answers at tcp://{address[6:]}"):
             make_executor(options(f"tcp://{address[6:]}", patience_s=1.0), n_points=None)
         with worker(address, tmp_path, *tls):
