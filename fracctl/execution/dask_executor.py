@@ -11,7 +11,7 @@ import pickle
 import threading
 import time
 from collections.abc import Callable, Mapping
-from concurrent.futures import Future
+from concurrent.futures import CancelledError, Future
 from contextlib import ExitStack, suppress
 from functools import partial
 from typing import Any, ParamSpec, TypeVar
@@ -95,7 +95,7 @@ class DaskExecutor(WorkerExecutor):
         try:
             inner = self._inner.submit(eval, ANSWER, {"request": packed(fn, args, kwargs)})
         except Exception as problem:  # noqa: BLE001 - an executor hands every exception to its future
-            self._fail(outer, RunError(f"the Dask scheduler at {self._address} is lost ({problem}); {_KEPT}"))
+            self._fail(outer, RunError(f"{self._lost(problem)}; {_KEPT}"))
             return outer
         inner.add_done_callback(partial(self._hand_over, outer))
         return outer
@@ -172,11 +172,11 @@ class DaskExecutor(WorkerExecutor):
         from distributed.scheduler import KilledWorker
 
         if inner.cancelled():
-            self._fail(outer, RunError(f"the Dask scheduler at {self._address} is lost; {_KEPT}"))
+            self._fail(outer, RunError(f"{self._lost(CancelledError())}; {_KEPT}"))
             return
         problem = inner.exception()
         if problem is None:
-            self._settle(outer, pickle.loads(inner.result()))
+            self._settle(outer, inner.result())
         elif isinstance(problem, KilledWorker):
             self._has_lost = True
             deaths = problem.allowed_failures + 1
@@ -187,7 +187,12 @@ class DaskExecutor(WorkerExecutor):
         else:
             self._fail(outer, WorkerError(f"{type(problem).__name__}: {problem}"))
 
-    def _settle(self, future: Future[Any], result: Any) -> None:
+    def _settle(self, future: Future[Any], answer: bytes) -> None:
+        try:
+            result = pickle.loads(answer)
+        except Exception as problem:  # noqa: BLE001 - an executor hands every exception to its future
+            self._fail(future, WorkerError(f"its result cannot be read: {_described(problem)}"))
+            return
         with self._lock:
             if future in self._pending:
                 self._pending.discard(future)
@@ -201,17 +206,22 @@ class DaskExecutor(WorkerExecutor):
 
     def _look_after(self) -> None:
         """Count the workers from time to time; give up when there has been none for the time of our patience."""
-        seen = time.monotonic()
+        seen, sentence = time.monotonic(), ""
         while not self._closing.wait(_LOOK_EVERY_S):
-            with suppress(Exception):
-                self._n_workers = len(self._client.nthreads())
-                if self._n_workers:
-                    seen = time.monotonic()
-            if time.monotonic() - seen > self._patience_s:
+            try:
+                self._n_workers, sentence = len(self._client.nthreads()), self._no_worker()
+            except Exception as problem:  # noqa: BLE001 - Dask has many ways to say that nobody answers
+                self._n_workers, sentence = 0, self._lost(problem)
+            if self._n_workers:
+                seen = time.monotonic()
+            elif time.monotonic() - seen > self._patience_s:
                 with self._lock:
                     pending = list(self._pending)
                 for future in pending:
-                    self._fail(future, RunError(f"{self._no_worker()}; {_KEPT}"))
+                    self._fail(future, RunError(f"{sentence}; {_KEPT}"))
+
+    def _lost(self, problem: BaseException) -> str:
+        return f"the Dask scheduler at {self._address} does not answer any more ({_described(problem)})"
 
     def _no_worker(self) -> str:
         return (

@@ -71,8 +71,12 @@ def scheduler(contact: Path, host: str, *further: str) -> Iterator[str]:
     """A scheduler; yields its address."""
     place = ("--host", host, "--port", "0", "--scheduler-file", str(contact))
     with started("scheduler", *place, *further):
-        until(lambda: contact.exists() and contact.read_text().strip().endswith("}"), seconds=60.0)
-        yield str(json.loads(contact.read_text())["address"])
+        yield address_in(contact)
+
+
+def address_in(contact: Path) -> str:
+    until(lambda: contact.exists() and contact.read_text().strip().endswith("}"), seconds=60.0)
+    return str(json.loads(contact.read_text())["address"])
 
 
 @pytest.fixture(scope="module")
@@ -164,6 +168,18 @@ def test_workers_that_all_go_end_the_run_with_a_sentence(
         RunError, match=r"has no worker for 2 s; start some by 'dask worker .*what was computed is kept"
     ):
         perform(job(tmp_path, options(address, patience_s=2.0), seconds=0.3), progress=gone)
+    check(perform(job(tmp_path)), undisturbed)
+
+
+def test_a_scheduler_that_goes_ends_the_run_with_a_sentence(tmp_path: Path, undisturbed: Path) -> None:
+    place = ("--host", "127.0.0.1", "--port", "0", "--scheduler-file", str(tmp_path / "scheduler.json"))
+    with started("scheduler", *place) as process:
+        address = address_in(tmp_path / "scheduler.json")
+        with (
+            worker(address, tmp_path),
+            pytest.raises(RunError, match=r"Dask scheduler at tcp.*what was computed is kept"),
+        ):
+            perform(job(tmp_path, options(address, patience_s=3.0), seconds=0.3), progress=Then(process.kill))
     check(perform(job(tmp_path)), undisturbed)
 
 
