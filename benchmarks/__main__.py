@@ -16,7 +16,18 @@ from pathlib import Path
 import pandas as pd
 from matplotlib.figure import Figure
 
-from benchmarks import comparison, delays, figures, machine, processes, report, tethers, throughput, work_precision
+from benchmarks import (
+    comparison,
+    delays,
+    figures,
+    machine,
+    processes,
+    report,
+    scaling,
+    tethers,
+    throughput,
+    work_precision,
+)
 from benchmarks.verdicts import Verdict
 
 FOLDER = Path("outputs/bench")
@@ -27,6 +38,7 @@ SECTIONS = {
     "delays": "Delayed feedback and jitcdde, one core, each at its own error",
     "tethers": "A tether under FDA-SMC and SciPy's stiff integrators, one core, each at its own error",
     "processes": "Start-up, whole runs, memory",
+    "scaling": "Surveys of millions of points: two workers against one process, memory of the parent",
 }
 
 
@@ -59,6 +71,8 @@ def _measured(name: str) -> tuple[pd.DataFrame, list[Verdict], list[str]]:
     """Return table, verdicts and notes of a section; those on one core keep this process there."""
     if name == "processes":
         return *processes.measure(), []
+    if name == "scaling":
+        return scaling.measure()
     with machine.one_core():
         if name == "throughput":
             return *throughput.measure(), []

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.stats import binom
 
 from fracctl.arrays import Array, Floats
 from fracctl.errors import ArgumentError, suggestion
@@ -80,6 +79,8 @@ def quantile_interval(count: int, share: float) -> tuple[int | None, int | None]
 
     By order statistics, whatever the distribution; None where there are too few samples for a bound on that side.
     """
+    from scipy.stats import binom  # takes half a second, in every worker
+
     low = int(binom.ppf(0.5 * (1.0 - CONFIDENCE), count, share))
     high = int(binom.ppf(0.5 * (1.0 + CONFIDENCE), count, share)) + 1
     return (low - 1 if low >= 1 else None), (high - 1 if high <= count else None)

@@ -28,8 +28,8 @@ INDEX_ADDRESSES = "|".join(
 
 
 README = (ROOT / "README.md").read_text(encoding="utf-8")
-(SHELL,) = re.findall(r"```sh\n(.*?)```", README, flags=re.DOTALL)
-README_COMMANDS = [shlex.split(line, comments=True)[1:] for line in SHELL.splitlines()]
+SHELL = "".join(re.findall(r"```sh\n(.*?)```", README, flags=re.DOTALL))
+README_COMMANDS = [shlex.split(line, comments=True)[1:] for line in SHELL.splitlines() if line.startswith("fracctl ")]
 
 
 def tracked_files() -> list[Path]:

@@ -9,6 +9,10 @@ if TYPE_CHECKING:
     from fracctl.execution.progress import Progress
 
 
+_SPEED_OVER_S = 300.0
+"""The rate is that of the last so many seconds: blocks of some surveys take a minute."""
+
+
 def display(label: str, quiet: bool) -> Progress:
     """Return a progress display; a silent one if asked, or if standard error is no terminal."""
     from fracctl.execution.progress import NoProgress
@@ -38,7 +42,7 @@ class Bar:
             TimeRemainingColumn(compact=True, elapsed_when_finished=True),
             console=Console(stderr=True),
             transient=True,
-            speed_estimate_period=10.0,
+            speed_estimate_period=_SPEED_OVER_S,
         )
         self._task = self._rich.add_task(label, total=None, rate="")
 
@@ -52,6 +56,11 @@ class Bar:
         speed = self._rich.tasks[0].speed
         rate = f"{speed:,.0f} points/s".replace(",", " ") if speed else ""
         self._rich.update(self._task, advance=points, rate=rate)
+
+    def found(self, points: int) -> None:
+        """Add points that say nothing of the rate."""
+        done = int(self._rich.tasks[0].completed)
+        self._rich.reset(self._task, completed=done + points)
 
     def finish(self) -> None:
         """Remove the bar."""

@@ -174,6 +174,8 @@ def _survey(config: RunConfig, evaluation: Evaluation, survey: Survey) -> Iterat
 def _scheduler(config: RunConfig) -> str:
     if config.scheduler.type == "serial":
         return "serial: in this process"
+    if address := getattr(config.scheduler, "address", None):
+        return f"dask: the workers of {address}"
     workers = getattr(config.scheduler, "workers", None)
     limit = getattr(config.scheduler, "time_limit", None)
     end = f"; a block may take {number(limit)} s" if limit else ""

@@ -10,6 +10,7 @@ from pydantic import AfterValidator, Field, PlainValidator, SerializeAsAny, Vali
 from pydantic_core import InitErrorDetails
 
 from fracctl.config import parts
+from fracctl.config.cluster import DaskScheduler
 from fracctl.config.evaluations import (
     AccuracyEvaluation,
     ComparisonEvaluation,
@@ -120,7 +121,11 @@ EVALUATIONS: Mapping[str, type[Typed]] = {
     "robust": RobustEvaluation,
     "flight": FlightEvaluation,
 }
-SCHEDULERS: Mapping[str, type[Typed]] = {"serial": SerialScheduler, "local": LocalScheduler}
+SCHEDULERS: Mapping[str, type[Typed]] = {
+    "serial": SerialScheduler,
+    "local": LocalScheduler,
+    "dask": DaskScheduler,
+}
 
 
 def _survey(value: Any, info: ValidationInfo) -> Typed:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import Executor
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import Any
@@ -16,8 +15,9 @@ from fracctl.errors import RunError
 from fracctl.evaluation import COUNTERS, Conclusion
 from fracctl.execution.cross_check import CrossCheck
 from fracctl.execution.drawing import draw_figures
-from fracctl.execution.executors import Executors, n_workers
+from fracctl.execution.executors import Executors
 from fracctl.execution.frequency_response import frequency_responses
+from fracctl.execution.gathering import Gathering
 from fracctl.execution.poles import COLUMNS as POLE_COLUMNS
 from fracctl.execution.poles import Poles
 from fracctl.execution.progress import Progress
@@ -25,15 +25,16 @@ from fracctl.execution.record import Record, run_log
 from fracctl.execution.row_store import RowStore, evaluations_schema
 from fracctl.execution.scheduler import Scheduler
 from fracctl.execution.solving_again import solve_again
-from fracctl.execution.summary import Tally, missing, notes_on, plain_tables, results, summarise
+from fracctl.execution.summary import missing, notes_on, plain_tables, results, summarise
 from fracctl.execution.tails import notes_on_tails
 from fracctl.execution.trajectories import trajectories
 from fracctl.execution.worker import Work, describe
+from fracctl.execution.workers import WorkerExecutor
 from fracctl.store.columns import schema
 from fracctl.store.files import remove_tree
 from fracctl.store.identity import canonical_json
 from fracctl.store.run_directory import RunDirectory
-from fracctl.surveys import Optima, Survey
+from fracctl.surveys import Survey
 
 _log = logging.getLogger(__name__)
 
@@ -69,9 +70,8 @@ class Computation:
         self._evaluation = job.work.evaluation()
         self._survey = job.survey()
         self._scheduler = job.configuration["scheduler"]
-        self._workers = n_workers(self._scheduler, self._survey.n_points)
         directory.create()
-        self._record = Record(directory, job.configuration, self._workers)
+        self._record = Record(directory, job.configuration)
         self._metadata = {
             "fracctl.configuration": canonical_json(job.configuration),
             "fracctl.provenance": canonical_json(self._record.provenance),
@@ -92,6 +92,7 @@ class Computation:
             self._record.write("running")
             lent = self._executors.lent(self._scheduler, self._survey.n_points)
             with run_log(self._directory.log), lent as executor:
+                self._record.provenance["workers"] = executor.workers
                 summary = self._compute(executor)
             self._record.write(summary["status"], summary, summary["error"])
             self._directory.write_manifest()
@@ -112,12 +113,16 @@ class Computation:
                     self._record.write("failed", error=describe(problem))
             raise
 
-    def _compute(self, executor: Executor) -> dict[str, Any]:
+    def _compute(self, executor: WorkerExecutor) -> dict[str, Any]:
         """Evaluate and conclude; workers check rows by another solver while this process writes and draws."""
-        store = self._evaluate(executor)
         work, seed = self._job.work, int(self._job.configuration["seed"])
         check = CrossCheck(self._evaluation, seed, lambda rows: executor.submit(solve_again, work, rows))
-        tally, optima = self._tables(store, check)
+        with self._directory.writing_evaluations(self._evaluations_schema) as write:
+            gathering = Gathering(self._evaluation, self._survey, check, write)
+            store = self._evaluate(executor, gathering)
+        tally, optima = gathering.tally, gathering.optima()
+        check.add_optima(optima)
+        check.begin()
         poles = self._write_optima(optima)
         conclusion = self._conclude(check)
         self._trajectories()
@@ -138,43 +143,23 @@ class Computation:
         tables = {"tables": plain_tables(conclusion.shown)} if conclusion.shown else {}
         return summarise(identity, store, found, notes) | tables | check.summary() | poles.summary()
 
-    def _evaluate(self, executor: Executor) -> RowStore:
-        store = RowStore(self._directory, self._evaluation, self._evaluations_schema)
-        in_flight = 2 * self._workers if self._workers > 1 else 1
-        scheduler = Scheduler(self._survey, executor, self._job.work, store, in_flight, self._progress.advance)
+    def _evaluate(self, executor: WorkerExecutor, gathering: Gathering) -> RowStore:
+        """Take the survey through the executor; rows are stored and gathered while workers compute the next."""
+        store = RowStore(self._directory, self._evaluation, self._evaluations_schema, gathering.take)
+        scheduler = Scheduler(self._survey, executor, self._job.work, store, self._progress)
         versions = self._record.provenance["versions"]
-        _log.info("fracctl %s, %s, workers: %d", versions["fracctl"], self._scheduler["type"], self._workers)
+        _log.info("fracctl %s, %s, workers: %d", versions["fracctl"], self._scheduler["type"], executor.workers)
         self._progress.start(self._survey.n_points)
         try:
             scheduler.run()
+            store.finish()
         finally:
             self._progress.finish()
             self._record.foreign_cpu_time_s = store.foreign_cpu_time_s
-        _log.info("%d blocks: %d were stored, %d failed", len(store.numbers), store.continued, len(store.failures))
-        if len(store.failures) == len(store.numbers):
+        _log.info("%d blocks: %d were stored, %d failed", store.blocks, store.continued, len(store.failures))
+        if len(store.failures) == store.blocks:
             raise RunError(f"every point failed: {next(iter(store.failures.values()), 'there is none')}")
         return store
-
-    def _tables(self, store: RowStore, check: CrossCheck) -> tuple[Tally, list[dict[str, Any]]]:
-        """Join the parts, select the optima, begin to check a share of the rows and the optima."""
-        evaluation = self._evaluation
-        self._directory.write_evaluations(self._evaluations_schema, store.tables())
-        tally = Tally()
-        selection = Optima(
-            evaluation.objectives,
-            evaluation.design_variables,
-            self._survey.slices,
-            self._survey.baseline,
-            any_single=not evaluation.has_poles,
-        )
-        for rows in self._directory.stream_evaluations():
-            tally.add(rows)
-            selection.add(rows)
-            check.add(rows)
-        optima = selection.rows()
-        check.add_optima(optima)
-        check.begin()
-        return tally, optima
 
     def _write_optima(self, optima: list[dict[str, Any]]) -> Poles:
         """Complete the optima by their poles, and write both."""

@@ -12,8 +12,8 @@ import numpy as np
 
 from fracctl.arrays import Array
 from fracctl.evaluation import Evaluation
-from fracctl.execution.processes import WorkerLost
 from fracctl.execution.solving_again import Found
+from fracctl.execution.workers import WorkerLost
 from fracctl.surveys.base import Rows
 
 _WORTHWHILE = 48

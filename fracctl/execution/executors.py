@@ -1,23 +1,28 @@
-"""Where blocks run: in this process, or in processes of this machine."""
+"""Where blocks run: in this process, in processes of this machine, or on a Dask cluster."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import Executor, Future
+from concurrent.futures import Future
 from contextlib import contextmanager
 from typing import Any, ParamSpec, TypeVar
 
+from fracctl.execution.dask_executor import DaskExecutor
 from fracctl.execution.processes import ProcessExecutor
 from fracctl.execution.threads import SINGLE_THREAD
+from fracctl.execution.workers import WorkerExecutor
 from fracctl.store.identity import canonical_json
 
 _P = ParamSpec("_P")
 _T = TypeVar("_T")
 
 
-class InProcessExecutor(Executor):
+class InProcessExecutor(WorkerExecutor):
     """Runs every call at once, where it is submitted."""
+
+    workers = 1
+    in_flight = 1
 
     def submit(self, fn: Callable[_P, _T], /, *args: _P.args, **kwargs: _P.kwargs) -> Future[_T]:
         """Run the call and return its finished future."""
@@ -29,24 +34,20 @@ class InProcessExecutor(Executor):
         return future
 
 
-def n_workers(scheduler: Mapping[str, Any], n_points: int | None) -> int:
-    """Return how many processes compute; 1 is this one. A single point is not worth another process."""
-    if scheduler["type"] == "serial" or n_points == 1:
-        return 1
-    return int(scheduler.get("workers") or n_cores())
-
-
 def n_cores() -> int:
     """Return the number of cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def make_executor(scheduler: Mapping[str, Any], n_points: int | None) -> Executor:
+def make_executor(scheduler: Mapping[str, Any], n_points: int | None) -> WorkerExecutor:
     """Return the executor of the configuration's `scheduler`; a single point with a time limit has its own process."""
     time_limit = scheduler.get("time_limit")
     if scheduler["type"] == "serial" or (n_points == 1 and time_limit is None):
         return InProcessExecutor()
-    return ProcessExecutor(n_workers(scheduler, n_points), SINGLE_THREAD, time_limit)
+    if scheduler["type"] == "dask":
+        return DaskExecutor(scheduler, n_cores())
+    workers = 1 if n_points == 1 else scheduler["workers"] or n_cores()
+    return ProcessExecutor(workers, SINGLE_THREAD, time_limit)
 
 
 class Executors:
@@ -56,7 +57,7 @@ class Executors:
     """
 
     def __init__(self) -> None:
-        self._idle: dict[tuple[bool, str], Executor] = {}
+        self._idle: dict[tuple[bool, str], WorkerExecutor] = {}
 
     def __enter__(self) -> Executors:
         return self
@@ -67,7 +68,7 @@ class Executors:
         self._idle.clear()
 
     @contextmanager
-    def lent(self, scheduler: Mapping[str, Any], n_points: int | None) -> Iterator[Executor]:
+    def lent(self, scheduler: Mapping[str, Any], n_points: int | None) -> Iterator[WorkerExecutor]:
         """Lend the executor of the configuration's `scheduler` for a run.
 
         An exception in the meantime shuts it down at once, in the middle of its calls.

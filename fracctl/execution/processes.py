@@ -19,41 +19,23 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable
-from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from multiprocessing.connection import Connection
 from typing import Any, ParamSpec, TypeVar
+
+from fracctl.execution.workers import OutOfTime, WorkerError, WorkerExecutor, WorkerLost
 
 _P = ParamSpec("_P")
 _T = TypeVar("_T")
 
 _PROGRAM = "import sys; sys.path[:] = {path!r}; from fracctl.execution.processes import serve; serve({descriptor})"
-
-
 _KILL_WITH_PARENT = 1
 """PR_SET_PDEATHSIG of prctl(2)."""
-
 _BEGUN = b""
 """What a worker says when it has loaded what a call needs, and begins with it."""
 
 
-class WorkerLost(Exception):
-    """A worker ended before it answered."""
-
-    attempts = 3
-    """How often a call is tried whose worker is lost."""
-
-
-class OutOfTime(WorkerLost):
-    """A worker was killed, for it was busy with a call for too long; most likely it will be again."""
-
-    attempts = 2
-
-
-class WorkerError(Exception):
-    """A call raised, or its result cannot be sent."""
-
-
-class ProcessExecutor(Executor):
+class ProcessExecutor(WorkerExecutor):
     """Calls functions in worker processes.
 
     Workers start when there is work for them, and are replaced when they die; the call they were busy with then
@@ -68,6 +50,7 @@ class ProcessExecutor(Executor):
     def __init__(
         self, workers: int, environment: dict[str, str] | None = None, time_limit: float | None = None
     ) -> None:
+        self._size = workers
         self._environment = os.environ | (environment or {})
         self._time_limit = time_limit
         self._threads = ThreadPoolExecutor(workers, thread_name_prefix="fracctl-worker")
@@ -75,6 +58,11 @@ class ProcessExecutor(Executor):
         self._lock = threading.Lock()
         self._workers: set[_Worker] = set()
         self._closed = False
+
+    @property
+    def workers(self) -> int:
+        """Number of processes, once there is work for all."""
+        return self._size
 
     def submit(self, fn: Callable[_P, _T], /, *args: _P.args, **kwargs: _P.kwargs) -> Future[_T]:
         """Call an importable function in a worker."""
@@ -179,9 +167,7 @@ class _Worker:
 def serve(descriptor: int) -> None:
     """Be a worker: answer the calls that come through a pipe until it ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(_KILL_WITH_PARENT, signal.SIGKILL)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    watch_parent()
     with Connection(descriptor) as connection, contextlib.suppress(EOFError, OSError):
         while True:
             connection.send_bytes(_answer(connection.recv_bytes(), connection))
@@ -194,6 +180,16 @@ def _answer(request: bytes, connection: Connection) -> bytes:
         return pickle.dumps((True, function(*args, **kwargs)), pickle.HIGHEST_PROTOCOL)
     except (Exception, SystemExit) as problem:  # noqa: BLE001 - the parent is told
         return pickle.dumps((False, f"{type(problem).__name__}: {problem}"))
+
+
+def watch_parent() -> None:
+    """Make this process end with the one that holds the other end of its standard input.
+
+    On Linux the kernel sees to it too, for a call that never lets another thread run.
+    """
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_KILL_WITH_PARENT, signal.SIGKILL)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
 
 
 def _end_with_parent() -> None:

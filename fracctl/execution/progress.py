@@ -16,6 +16,10 @@ class Progress(Protocol):
         """So many further points are stored."""
         ...
 
+    def found(self, points: int) -> None:
+        """So many further points were stored before, and cost no time now."""
+        ...
+
     def finish(self) -> None:
         """End, also after a failure or an interruption."""
         ...
@@ -28,6 +32,9 @@ class NoProgress:
         """Ignore."""
 
     def advance(self, points: int) -> None:
+        """Ignore."""
+
+    def found(self, points: int) -> None:
         """Ignore."""
 
     def finish(self) -> None:

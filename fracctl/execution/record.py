@@ -22,10 +22,9 @@ class Record:
     Args:
         directory: of the run.
         configuration: plain data.
-        workers: number of processes that compute.
     """
 
-    def __init__(self, directory: RunDirectory, configuration: Mapping[str, Any], workers: int) -> None:
+    def __init__(self, directory: RunDirectory, configuration: Mapping[str, Any]) -> None:
         self._directory = directory
         self._configuration = dict(configuration)
         self.run_id = run_id(configuration)
@@ -33,7 +32,7 @@ class Record:
         self._wall_time_s = float(before.get("wall_time_s", 0.0))
         self._cpu_time_s = float(before.get("cpu_time_s", 0.0))
         self._started = (time.perf_counter(), time.process_time())
-        self.provenance = provenance(configuration) | {"workers": workers, "started": before.get("started") or _now()}
+        self.provenance = provenance(configuration) | {"started": before.get("started") or _now()}
         self.foreign_cpu_time_s = 0.0
 
     def write(self, status: str, summary: Mapping[str, Any] | None = None, error: str | None = None) -> None:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import logging
 import os
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 
 import numpy as np
 import pyarrow as pa
 
 from fracctl.arrays import Array
 from fracctl.evaluation import COUNTERS, Evaluation
+from fracctl.execution.in_order import InOrder
 from fracctl.execution.worker import Outcome
 from fracctl.store.columns import REASON, TEXT, schema
 from fracctl.store.parts import Parts
@@ -30,13 +31,23 @@ def evaluations_schema(evaluation: Evaluation, further: Iterable[str], metadata:
 
 
 class RowStore:
-    """The parts of a run, written block by block."""
+    """The parts of a run, written block by block, and handed on in the order of their numbers.
 
-    def __init__(self, directory: RunDirectory, evaluation: Evaluation, table: pa.Schema) -> None:
+    Args:
+        directory: of the run.
+        evaluation: of the rows.
+        table: schema of the rows.
+        take: is handed the table of every block, those of failed ones too.
+    """
+
+    def __init__(
+        self, directory: RunDirectory, evaluation: Evaluation, table: pa.Schema, take: Callable[[pa.Table], None]
+    ) -> None:
         self._parts = Parts(directory.parts, table)
+        self._ordered = InOrder(lambda number: next(self._parts.tables([number])), take)
         self._evaluation = evaluation
-        self.numbers: list[int] = []
-        """Blocks that are stored."""
+        self.blocks = 0
+        """Number of blocks that are stored."""
         self.failures: dict[int, str] = {}
         """Blocks that could not be computed, with the reason."""
         self.failed_points = 0
@@ -59,8 +70,9 @@ class RowStore:
         if any(rows[name][: block.size].tobytes() != values.tobytes() for name, values in block.design.items()):
             _log.warning("block %d is computed again: it was stored with other points", block.number)
             return None
-        self.numbers.append(block.number)
+        self.blocks += 1
         self.continued += 1
+        self._ordered.add(block.number)
         return rows
 
     def save(self, block: Block, outcome: Outcome) -> Rows:
@@ -68,18 +80,19 @@ class RowStore:
         rows = dict(outcome.rows) if outcome.rows is not None else self._failed_rows(block, str(outcome.reason))
         n_conditions = len(self._evaluation.initial_conditions)
         rows[POINT] = block.first_point + rows.get(POINT, np.tile(np.arange(block.size), n_conditions))
-        self._parts.save(block.number, rows, outcome.reason)
-        self.numbers.append(block.number)
+        table = self._parts.save(block.number, rows, outcome.reason)
+        self.blocks += 1
         self.foreign_cpu_time_s += outcome.cpu_time_s if outcome.process != os.getpid() else 0.0
         if outcome.reason is not None:
             self.failures[block.number] = outcome.reason
             self.failed_points += block.size
             _log.error("block %d failed: %s\n%s", block.number, outcome.reason, outcome.trace)
+        self._ordered.add(block.number, table)
         return rows
 
-    def tables(self) -> Iterator[pa.Table]:
-        """Yield all parts in the order of their blocks."""
-        return self._parts.tables(sorted(self.numbers))
+    def finish(self) -> None:
+        """Hand on what has waited for blocks that the survey has left out."""
+        self._ordered.finish()
 
     def _failed_rows(self, block: Block, reason: str) -> dict[str, Array]:
         names = list(self._evaluation.initial_conditions)

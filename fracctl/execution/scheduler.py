@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import logging
 from collections import Counter, deque
-from collections.abc import Callable
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
+from concurrent.futures import FIRST_COMPLETED, Future, wait
 from typing import Protocol
 
 from fracctl.errors import RunError
-from fracctl.execution.processes import OutOfTime, WorkerLost
+from fracctl.execution.progress import Progress
 from fracctl.execution.worker import Outcome, Work, describe, evaluate
+from fracctl.execution.workers import OutOfTime, WorkerExecutor, WorkerLost
 from fracctl.surveys import Block, Survey
 from fracctl.surveys.base import Rows
 
@@ -32,33 +32,31 @@ class BlockStore(Protocol):
 class Scheduler:
     """Runs a survey to its end.
 
-    At most `in_flight` blocks are submitted at a time. A block whose worker is lost is submitted again, as often as
-    `WorkerLost` or `OutOfTime` says; any other failure is final for this run.
+    As many blocks are submitted at a time as the executor has in flight. A block whose worker is lost is submitted
+    again, as often as `WorkerLost` or `OutOfTime` says; any other failure is final for this run.
 
     Args:
         survey: what is asked and told.
         executor: where blocks run; it is shut down at Ctrl-C.
         work: the evaluation.
         store: keeps the rows of finished blocks, and answers for those it has.
-        in_flight: how many blocks are submitted at a time.
-        advance: called with the number of points of each block that is stored.
+        progress: is told of every block that is stored.
 
     Raises:
-        RunError: workers die one after the other, or the store cannot be written.
+        RunError: workers die one after the other, the executor has none left, or the store cannot be written.
         KeyboardInterrupt: Ctrl-C; blocks that were done by then are stored, all others are abandoned at once.
     """
 
     def __init__(
         self,
         survey: Survey,
-        executor: Executor,
+        executor: WorkerExecutor,
         work: Work,
         store: BlockStore,
-        in_flight: int,
-        advance: Callable[[int], None],
+        progress: Progress,
     ) -> None:
         self._survey, self._executor, self._work, self._store = survey, executor, work, store
-        self._in_flight, self._advance = in_flight, advance
+        self._progress = progress
         self._queue: deque[Block] = deque()
         self._pending: dict[Future[Outcome], Block] = {}
         self._attempts: Counter[int] = Counter()
@@ -76,7 +74,7 @@ class Scheduler:
             raise
 
     def _submit(self) -> None:
-        while len(self._pending) < self._in_flight:
+        while len(self._pending) < self._executor.in_flight:
             block = self._next()
             if block is None:
                 return
@@ -93,7 +91,8 @@ class Scheduler:
             rows = self._store.load(block)
             if rows is None:
                 return block
-            self._tell(block, rows)
+            self._survey.tell(block.number, rows)
+            self._progress.found(block.size)
 
     def _collect(self) -> None:
         if not self._pending:
@@ -112,20 +111,19 @@ class Scheduler:
         except WorkerLost as problem:
             self._attempts[block.number] += 1
             self._lost_in_a_row += not isinstance(problem, OutOfTime)
-            if self._lost_in_a_row > WorkerLost.attempts * self._in_flight:
+            if self._lost_in_a_row > WorkerLost.attempts * self._executor.in_flight:
                 raise RunError(f"worker processes keep ending: {problem}; scheduler=serial does without") from None
             if self._attempts[block.number] < problem.attempts:
                 _log.warning("block %d is tried again: %s", block.number, problem)
                 self._queue.appendleft(block)
                 return
             outcome = Outcome(None, str(problem))
+        except RunError:
+            raise
         except Exception as problem:  # noqa: BLE001 - becomes rows with their reason
             outcome = Outcome(None, describe(problem))
-        self._tell(block, self._store.save(block, outcome))
-
-    def _tell(self, block: Block, rows: Rows) -> None:
-        self._survey.tell(block.number, rows)
-        self._advance(block.size)
+        self._survey.tell(block.number, self._store.save(block, outcome))
+        self._progress.advance(block.size)
 
     def _keep_what_is_done(self) -> None:
         for future, block in self._pending.items():

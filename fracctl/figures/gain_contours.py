@@ -70,14 +70,15 @@ def build(results: Results, selection: Selection) -> tuple[Figure, pd.DataFrame]
 
 
 def _panels(results: Results, selection: Selection, initial_condition: str) -> list[_Panel]:
-    evaluations = results.evaluations[results.evaluations["initial_condition"] == initial_condition]
     cut, title = results.slice_variable, labels.initial_condition(initial_condition)
+    columns = ["initial_condition", *([cut] if cut else []), *results.varied, selection.value_column, "status"]
     panels: list[_Panel] = []
     for kind in ("baseline", "overall"):
         best = optimum(results, selection, initial_condition, kind)
         if best is None or any(cut is None or best[cut] == panel.best[cut] for panel in panels):
             continue
-        rows = evaluations if cut is None else evaluations[evaluations[cut] == best[cut]]
+        wanted = {"initial_condition": [initial_condition]} | ({cut: [best[cut]]} if cut else {})
+        rows = results.run.evaluations_where(wanted, columns)
         panels.append(_Panel(rows, best, title + (f", ${labels.symbol(cut)} = {best[cut]:g}$" if cut else "")))
     if not panels:
         raise FigureError(f"'{initial_condition}' has no optimum of {selection.objective}")

@@ -30,13 +30,13 @@ def build(results: Results, selection: Selection) -> tuple[Figure, pd.DataFrame]
     Raises:
         FigureError: the survey does not vary one or two variables, or multipliers were not measured.
     """
-    if len(results.varied) not in (1, 2) or "largest_multiplier" not in results.evaluations:
+    if len(results.varied) not in (1, 2) or "largest_multiplier" not in results.columns:
         raise FigureError("the survey must vary one or two variables, and measure largest_multiplier")
     first, *second = results.varied
     figure = Figure(figsize=(FULL_WIDTH_IN, _HEIGHT_IN * len(selection.initial_conditions)), layout="constrained")
     axes = figure.subplots(len(selection.initial_conditions), 2, squeeze=False, sharex=True)
     columns = ["initial_condition", *results.varied, "largest_multiplier", "periodicity_error", "status"]
-    table = results.evaluations[columns]
+    table = results.run.evaluations(columns)
     for name, (left, right) in zip(selection.initial_conditions, axes, strict=True):
         rows = table[table["initial_condition"] == name]
         groups = list(rows.groupby(second[0])) if second else [(None, rows)]

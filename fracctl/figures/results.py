@@ -61,6 +61,11 @@ class Results:
         return self.run.evaluations()
 
     @cached_property
+    def columns(self) -> tuple[str, ...]:
+        """Columns of the evaluated points."""
+        return self.run.evaluations_columns
+
+    @cached_property
     def optima(self) -> pd.DataFrame:
         """Optima by kind: slice, overall, baseline; the row's number is the `run` of a trajectory."""
         return self.run.optima()
@@ -96,7 +101,8 @@ class Results:
     def varied(self) -> tuple[str, ...]:
         """Design variables, the slices' apart, of which the table holds more than one value."""
         axes = self.configuration["survey"].get("axes", {})
-        return tuple(name for name in axes if name != self.slice_variable and self.evaluations[name].nunique() > 1)
+        names = [name for name in axes if name != self.slice_variable]
+        return tuple(name for name in names if self.run.varies(name))
 
     @property
     def horizon_periods(self) -> float:

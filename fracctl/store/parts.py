@@ -45,12 +45,14 @@ class Parts:
                 left.unlink()
         self._digests = dict(read_digests(directory))
 
-    def save(self, number: int, rows: Mapping[str, Array], failed: str | None = None) -> None:
-        """Write the rows of a block; `failed` says why the block could not be computed."""
+    def save(self, number: int, rows: Mapping[str, Array], failed: str | None = None) -> pa.Table:
+        """Write the rows of a block and return them; `failed` says why the block could not be computed."""
         metadata = dict(self._schema.metadata or {}) | ({_FAILED: failed.encode()} if failed else {})
-        content = tables.serialise(columns.to_table(rows, self._schema).replace_schema_metadata(metadata))
+        table = columns.to_table(rows, self._schema)
+        content = tables.serialise(table.replace_schema_metadata(metadata))
         self._note(number, hashlib.sha256(content).hexdigest())
         write_bytes(self._path(number), content)
+        return table
 
     def load(self, number: int) -> dict[str, Array] | None:
         """Return the rows of a block; None where they are still to be computed, or to be tried again."""

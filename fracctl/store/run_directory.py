@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 import pyarrow as pa
+import pyarrow.compute as pc
 
 from fracctl.arrays import Array
 from fracctl.errors import RunError
@@ -101,10 +104,31 @@ class RunDirectory:
         """Return every evaluated point, or some columns of them."""
         return tables.to_pandas(tables.read(self.evaluations_path, None if columns is None else list(columns)))
 
+    @property
+    def evaluations_columns(self) -> tuple[str, ...]:
+        """Columns of the evaluated points."""
+        return tables.columns(self.evaluations_path)
+
     def stream_evaluations(self) -> Iterator[dict[str, Array]]:
         """Yield every evaluated point, piece by piece, as arrays."""
         for table in tables.stream(self.evaluations_path):
             yield to_rows(table)
+
+    def varies(self, column: str) -> bool:
+        """Return whether the evaluated points have more than one value in a column of numbers."""
+        known = np.zeros(0)
+        for table in tables.stream(self.evaluations_path, [column]):
+            values = table.column(column).to_numpy()
+            values = values[~np.isnan(values)]
+            known = known if known.size else values[:1]
+            if np.any(values != known):
+                return True
+        return False
+
+    def evaluations_where(self, wanted: Mapping[str, Sequence[Any]], columns: Sequence[str]) -> pd.DataFrame:
+        """Return some columns of the points whose columns have one of the `wanted` values; only those are held."""
+        found = [_chosen(table, wanted) for table in tables.stream(self.evaluations_path, list(columns))]
+        return tables.to_pandas(pa.concat_tables(found))
 
     def optima(self) -> pd.DataFrame:
         """Return the optima by kind, slice and objective."""
@@ -122,9 +146,9 @@ class RunDirectory:
         """Return the frequency responses of the overall and baseline optima; `run` is their row."""
         return tables.to_pandas(tables.read(self.frequency_response_path))
 
-    def write_evaluations(self, schema: pa.Schema, parts: Iterable[pa.Table]) -> None:
-        """Join the parts."""
-        tables.write(self.evaluations_path, schema, parts)
+    def writing_evaluations(self, schema: pa.Schema) -> AbstractContextManager[Callable[[pa.Table], None]]:
+        """Return a context that gives what takes the rows, table by table; with its end they are stored."""
+        return tables.writing(self.evaluations_path, schema)
 
     def write_optima(self, schema: pa.Schema, optima: Iterable[Mapping[str, Any]]) -> None:
         """Write the optima, one mapping a row."""
@@ -184,3 +208,9 @@ class RunDirectory:
     @property
     def _aside(self) -> Path:
         return self.path.with_name(f".{self.path.name}.old")
+
+
+def _chosen(table: pa.Table, wanted: Mapping[str, Sequence[Any]]) -> pa.Table:
+    for name, values in wanted.items():
+        table = table.filter(pc.is_in(table.column(name), pa.array(values, table.schema.field(name).type)))
+    return table

@@ -109,7 +109,9 @@ class Optima:
             self._offer_also_single(rows, present & matching, allowed, (objective, name, "baseline", ()))
         if self._slices:
             table = np.stack([rows[column] for column in self._slices], axis=-1)
-            for values in np.unique(table[present], axis=0):
+            own = table[present]
+            first = np.append(True, (own[1:] != own[:-1]).any(axis=1))  # of rows that follow each other on one slice
+            for values in np.unique(own[first], axis=0):
                 inside = present & (table == values).all(axis=1)
                 self._offer_also_single(rows, inside, allowed, (objective, name, "slice", tuple(values.tolist())))
 

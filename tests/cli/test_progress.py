@@ -58,3 +58,21 @@ def test_no_colour_where_none_is_wanted(monkeypatch: pytest.MonkeyPatch) -> None
 
 def test_finishing_without_having_started() -> None:
     Bar("label").finish()
+
+
+def test_the_time_left_is_that_of_what_is_computed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Half of a survey is stored already, the rest comes in blocks that take a minute."""
+    monkeypatch.setattr(sys, "stderr", Terminal())
+    bar, now = Bar("label"), [0.0]
+    bar._rich.get_time = lambda: now[0]
+    bar.start(2000)
+    for _ in range(10):
+        bar.found(100)
+    for _ in range(4):
+        now[0] += 60.0
+        bar.advance(100)
+    task = bar._rich.tasks[0]
+    bar.finish()
+    assert task.completed == 1400
+    assert task.speed == pytest.approx(100.0 / 60.0)
+    assert task.time_remaining == pytest.approx(360.0, abs=1.0)

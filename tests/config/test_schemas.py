@@ -61,6 +61,9 @@ def test_all_errors_come_at_once() -> None:
     ]
 
 
+TLS = ["scheduler=dask", *(f"scheduler.tls_{name}=a.pem" for name in ("ca_file", "client_cert", "client_key"))]
+
+
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
@@ -103,7 +106,14 @@ def test_all_errors_come_at_once() -> None:
         (["scheduler=local", "scheduler.workers=0"], "scheduler.workers = 0: must be at least 1"),
         (["scheduler=local", "scheduler.workers=1.5"], "scheduler.workers = 1.5: must be a whole number"),
         (["scheduler.workers=2"], "unknown key 'scheduler.workers'; allowed: type"),
-        (["scheduler.type=lokal"], "scheduler.type = lokal: must be one of serial, local; did you mean 'local'?"),
+        (["scheduler.type=lokal"], "scheduler.type = lokal: must be one of serial, local, dask; did you mean 'local'?"),
+        (["scheduler=dask", "scheduler.address=localhost"], ("scheduler.address = localhost: must be "
+         "tcp://HOST:PORT or tls://HOST:PORT, as 'dask scheduler' prints it")),
+        (["scheduler=dask", "scheduler.address=tcp://a:1", "scheduler.workers=2"], ("scheduler.workers = 2: goes "
+         "without scheduler.address only; there, 'dask worker --nworkers N' says how many")),
+        (["scheduler=dask", "scheduler.patience_s=0"], "scheduler.patience_s = 0: must be above 0"),
+        ([*TLS, "scheduler.address=tls://a:1", "scheduler.tls_client_key=null"],
+         "scheduler.tls_client_key = null: must be given where tls_ca_file is"),
         (["figures.a.type=pie"], f"figures.a.type = pie: must be {', '.join(FIGURES[:-1])} or {FIGURES[-1]}"),
         (["figures.trajectories.objective=fast"], ("figures.trajectories.objective = fast: must be one of the run's "
          "objectives (settling_time, st_os_u)")),

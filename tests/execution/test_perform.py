@@ -28,6 +28,7 @@ class Watch:
     def __init__(self, interrupt_after: int | None = None) -> None:
         self.total: int | None = None
         self.points = 0
+        self.stored = 0
         self.finished = False
         self._interrupt_after = interrupt_after
 
@@ -38,6 +39,10 @@ class Watch:
         self.points += points
         if self._interrupt_after is not None and self.points >= self._interrupt_after:
             raise KeyboardInterrupt
+
+    def found(self, points: int) -> None:
+        self.points += points
+        self.stored += points
 
     def finish(self) -> None:
         self.finished = True
@@ -198,7 +203,9 @@ def test_an_interrupted_run_continues(tmp_path: Path, undisturbed: Path, after: 
     assert RunDirectory(directory).status == "interrupted"
     kept = len(list((directory / "parts").glob("*.parquet")))
     assert 0 < kept <= N_BLOCKS
-    finished = perform(job(tmp_path))
+    watch = Watch()
+    finished = perform(job(tmp_path), progress=watch)
+    assert (watch.points, watch.stored) == (N_POINTS, kept * N_POINTS // N_BLOCKS)
     assert f"{N_BLOCKS} blocks: {kept} were stored" in (directory / "run.log").read_text()
     assert tables_of(finished.run_directory) == tables_of(undisturbed)
 

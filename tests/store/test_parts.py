@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
@@ -150,7 +151,9 @@ def test_parts_are_joined_in_order_and_large_groups(tmp_path: Path) -> None:
     for number in (2, 0, 1):
         parts.save(number, rows(100 * number))
     run = RunDirectory(tmp_path)
-    run.write_evaluations(SCHEMA, parts.tables([0, 1, 2]))
+    with run.writing_evaluations(SCHEMA) as take:
+        for table in parts.tables([0, 1, 2]):
+            take(table)
     assert run.evaluations(["point"])["point"].tolist() == [first + i for first in (0, 100, 200) for i in range(50)]
     assert pq.ParquetFile(run.evaluations_path).num_row_groups == 1
     assert pq.read_schema(run.evaluations_path).metadata[b"fracctl.configuration"] == b"{}"
@@ -165,8 +168,12 @@ def test_a_full_disk_while_joining(tmp_path: Path) -> None:
     parts = Parts(tmp_path / "parts", SCHEMA)
     parts.save(0, rows())
     run = RunDirectory(tmp_path)
-    with full_after(500), pytest.raises(RunError, match=r"evaluations.parquet: No space left on device"):
-        run.write_evaluations(SCHEMA, parts.tables([0]))
+    with (
+        full_after(500),
+        pytest.raises(RunError, match=r"evaluations.parquet: No space left on device"),
+        run.writing_evaluations(SCHEMA) as take,
+    ):
+        take(next(parts.tables([0])))
     assert not run.evaluations_path.exists()
 
 
@@ -180,3 +187,19 @@ def test_a_table_that_cannot_be_read_is_one_sentence(tmp_path: Path) -> None:
     run.optima_path.write_bytes(bytes(content))
     with pytest.raises(RunError, match=r"cannot read .*optima.parquet"):
         run.optima()
+
+
+def test_some_points_and_columns_of_a_table(tmp_path: Path) -> None:
+    run = RunDirectory(tmp_path)
+    with run.writing_evaluations(SCHEMA) as take:
+        for first in (0, 100, 200):
+            take(columns.to_table(rows(first), SCHEMA))
+    whole = run.evaluations()
+    assert run.evaluations_columns == tuple(whole.columns)
+    wanted = whole["alpha_w"].unique()[:2].tolist()
+    found = run.evaluations_where({"alpha_w": wanted, "status": ["ok"]}, ["alpha_w", "status", "point"])
+    expected = whole[whole["alpha_w"].isin(wanted) & (whole["status"] == "ok")][["alpha_w", "status", "point"]]
+    pd.testing.assert_frame_equal(found, expected.reset_index(drop=True))
+    assert {name: run.varies(name) for name in ("point", "alpha_w")} == {
+        name: whole[name].nunique() > 1 for name in ("point", "alpha_w")
+    }
