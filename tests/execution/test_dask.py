@@ -24,8 +24,9 @@ from fracctl.execution.perform import RunResult, perform
 from fracctl.execution.workers import WorkerError, WorkerExecutor
 from fracctl.store import RunDirectory
 from tests.execution.fakes import N_BLOCKS, job
-from tests.execution.test_local import LOCAL, ROOT, children, is_running, script, until
+from tests.execution.test_local import LOCAL
 from tests.execution.test_perform import Watch, tables_of
+from tests.faults.processes import ROOT, children_of, is_running, script, until
 
 PATIENCE_S = 20.0
 WITHOUT_FRACCTL = """
@@ -219,14 +220,14 @@ def test_a_worker_that_joins_late_must_fit_too(here: WorkerExecutor, monkeypatch
 
 
 def test_blocks_that_always_kill_their_workers_harm_no_other(tmp_path: Path) -> None:
-    before = children()
+    before = set(children_of(os.getpid()))
     found = perform(job(tmp_path, HERE, faults=[{"kind": "is killed", "alpha_w": 0.9}]))
     failed = found.evaluations[found.evaluations["status"] == "failed"]
     assert failed["alpha_w"].unique().tolist() == [0.9]
     assert failed["reason"].unique().tolist() == ["its worker process died"]
     assert found.summary["status"] == "incomplete"
     assert log(found).count("block 2 is tried again") == 2
-    until(lambda: children() <= before)
+    until(lambda: set(children_of(os.getpid())) <= before)
     assert perform(job(tmp_path)).summary["status"] == "finished"
 
 
