@@ -6,12 +6,13 @@ import sys
 from collections.abc import Sequence
 from types import ModuleType
 
-from fracctl.cli import export, listing, output, reproduce, run, show, validate
+from fracctl.cli import export, init, listing, output, reproduce, run, show, validate
 from fracctl.cli.failure import report
 from fracctl.errors import UsageError, suggestion
 
 INTERRUPTED = 130
 COMMANDS: dict[str, ModuleType] = {
+    "init": init,
     "run": run,
     "reproduce": reproduce,
     "list": listing,
@@ -37,6 +38,7 @@ a first run:
   fracctl list experiments                   what there is to run
   fracctl run experiment=ic1_outofplane      the best gains and order from IC1, stored and drawn in seconds
   fracctl show experiment=ic1_outofplane     what that computes, in words and units
+  fracctl init my_study                      a study to change: the orbit, the start, several laws
 
 exit codes: 0 done, 1 a run failed or a published number does not come out as it must, 2 wrong command line,
             3 wrong configuration, 130 interrupted

@@ -45,6 +45,7 @@ class Parser(argparse.ArgumentParser):
     def add_overrides(self, **further: str) -> None:
         """Add the positional arguments group=option and key=value."""
         text = "group=option, group.key=value, or ~group.key to remove a key ('fracctl list' names groups and options)"
+        text += "; or the name of a study, my_study for my_study.yaml"
         self.add_argument("overrides", nargs="*", metavar="OVERRIDE", help=further.get("help", text))
 
     def parse(self, arguments: Sequence[str]) -> argparse.Namespace:

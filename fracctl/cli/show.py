@@ -21,7 +21,7 @@ _EXAMPLES = """\
 
 def parser() -> Parser:
     """Return the command's parser."""
-    parser = Parser("show", "[OVERRIDE …]", _DESCRIPTION, _EXAMPLES)
+    parser = Parser("show", "[STUDY] [OVERRIDE …]", _DESCRIPTION, _EXAMPLES)
     parser.add_overrides()
     parser.add_config_dir()
     return parser

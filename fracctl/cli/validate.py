@@ -24,7 +24,7 @@ _EXAMPLES = """\
 
 def parser() -> Parser:
     """Return the command's parser."""
-    parser = Parser("validate", "[OVERRIDE … | RUN_DIR]", _DESCRIPTION, _EXAMPLES)
+    parser = Parser("validate", "[STUDY] [OVERRIDE …] | RUN_DIR", _DESCRIPTION, _EXAMPLES)
     parser.add_overrides(help="as for 'fracctl run', or the directory of a stored run")
     parser.add_config_dir()
     return parser

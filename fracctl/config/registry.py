@@ -65,6 +65,7 @@ BUILT_IN: Mapping[str, Mapping[str, str]] = {
         "delta_v": "fracctl.measures.fuel:DeltaV",
         "station_keeping": "fracctl.measures.fuel:StationKeeping",
         "peak_thrust": "fracctl.measures.fuel:PeakThrust",
+        "peak_force": "fracctl.measures.fuel:PeakForce",
         "propellant": "fracctl.measures.fuel:Propellant",
         "hold_error": "fracctl.measures.hold_error:HoldError",
         "overshoot_m": "fracctl.measures.overshoot_m:OvershootM",

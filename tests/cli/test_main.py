@@ -55,7 +55,7 @@ def test_without_a_command_the_help_goes_to_standard_error(capsys: pytest.Captur
         (["run", "-x"], "unknown option '-x'"),
         (["run", "--cfg", "all"], "argument --cfg: invalid choice: 'all'"),
         (["run", "--config-dir"], "argument --config-dir: expected one argument"),
-        (["run", "foo"], "'foo' is not an override; write KEY=VALUE"),
+        (["run", "foo"], "'foo' is neither an override, KEY=VALUE, nor a study, for there is no foo.yaml"),
         (["list", "contoller"], "there is no group 'contoller'; did you mean 'controller'?"),
         (["list", "plant", "solver"], "'list' takes one group"),
         (["list", "runs", "here"], "'list runs' takes output_dir=DIR only"),
