@@ -6,7 +6,7 @@ import sys
 from collections.abc import Sequence
 from types import ModuleType
 
-from fracctl.cli import export, init, listing, output, reproduce, run, show, validate
+from fracctl.cli import completion, export, init, listing, output, reproduce, run, show, validate
 from fracctl.cli.failure import report
 from fracctl.errors import UsageError, suggestion
 
@@ -19,6 +19,7 @@ COMMANDS: dict[str, ModuleType] = {
     "show": show,
     "validate": validate,
     "export": export,
+    "completion": completion,
 }
 
 _HELP = """\
@@ -79,6 +80,9 @@ def _dispatch(words: list[str]) -> int:
         return 0
     if first not in COMMANDS:
         raise UsageError(_unknown(first))
+    if first == "completion" and rest[:1] == [completion.COMPLETE]:
+        completion.show_candidates(" ".join(rest[1:]), COMMANDS)
+        return 0
     command = COMMANDS[first]
     code: int = command.execute(command.parser().parse(rest))
     return code

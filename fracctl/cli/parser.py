@@ -39,7 +39,8 @@ class Parser(argparse.ArgumentParser):
             "--config-dir",
             type=Path,
             metavar="DIR",
-            help="a directory of your own YAML files, laid out as conf/; they win over built-in ones of the same name",
+            help="a directory of your own YAML files, laid out as conf/; they win over built-in ones of the same name "
+            "(default: $FRACCTL_CONFIG_DIR)",
         )
 
     def add_overrides(self, **further: str) -> None:
@@ -58,6 +59,11 @@ class Parser(argparse.ArgumentParser):
         for word in unknown:
             raise UsageError(f"unknown option '{word}'{suggestion(word.partition('=')[0], self.flags)}")
         return options
+
+    @property
+    def arguments(self) -> list[argparse.Action]:
+        """All arguments, as they were added."""
+        return list(self._actions)
 
     @property
     def flags(self) -> list[str]:

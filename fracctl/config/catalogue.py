@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -10,6 +11,9 @@ from fracctl.errors import ConfigurationError, suggestion
 
 SEVERAL_ALLOWED = frozenset({"initial_condition", "figures"})
 """Groups of which a run may take several options, or (figures) none."""
+
+OWN_DIRECTORY = "FRACCTL_CONFIG_DIR"
+"""Environment variable with the user's directory, where the command line names none."""
 
 _PACKAGE = Path(__file__).resolve().parent.parent
 
@@ -67,6 +71,8 @@ def catalogue(config_dir: Path | None = None, study: Path | None = None) -> Cata
     Raises:
         ConfigurationError: a directory does not exist, or the study has the name of an experiment.
     """
+    if config_dir is None and os.environ.get(OWN_DIRECTORY):
+        config_dir = Path(os.environ[OWN_DIRECTORY])
     own = [] if config_dir is None else [_existing(config_dir)]
     found = Catalogue((*own, built_in_directory(), *_extensions()))
     if study is None:
