@@ -6,7 +6,7 @@ import sys
 from collections.abc import Sequence
 from types import ModuleType
 
-from fracctl.cli import completion, export, init, listing, output, reproduce, run, show, validate
+from fracctl.cli import compare, completion, export, init, listing, output, reproduce, run, show, validate
 from fracctl.cli.failure import report
 from fracctl.errors import UsageError, suggestion
 
@@ -14,6 +14,7 @@ INTERRUPTED = 130
 COMMANDS: dict[str, ModuleType] = {
     "init": init,
     "run": run,
+    "compare": compare,
     "reproduce": reproduce,
     "list": listing,
     "show": show,

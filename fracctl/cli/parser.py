@@ -43,6 +43,10 @@ class Parser(argparse.ArgumentParser):
             "(default: $FRACCTL_CONFIG_DIR)",
         )
 
+    def add_json(self, what: str) -> None:
+        """Add --json."""
+        self.add_argument("--json", action="store_true", help=f"{what}, and nothing else")
+
     def add_overrides(self, **further: str) -> None:
         """Add the positional arguments group=option and key=value."""
         text = "group=option, group.key=value, or ~group.key to remove a key ('fracctl list' names groups and options)"

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -68,7 +66,7 @@ def parser() -> Parser:
         "--cfg", choices=["job"], metavar="job", help="'--cfg job' prints the resolved configuration and exits"
     )
     parser.add_config_dir()
-    parser.add_argument("--json", action="store_true", help="one JSON object a line for each run, and nothing else")
+    parser.add_json("one JSON object a line for each run")
     parser.add_argument("--fresh", action="store_true", help="compute again what is stored already")
     parser.add_argument("--quiet", action="store_true", help="no progress on standard error, no notes")
     parser.add_argument("--fail-fast", action="store_true", help="with -m: do not start further runs after a failure")
@@ -141,7 +139,7 @@ def _run(job: _Job, options: argparse.Namespace, executors: Executors) -> Except
         summary = execute_run(job.config, fresh=options.fresh, progress=progress, executors=executors).summary
     except Exception as error:  # noqa: BLE001 - the other runs go on
         if options.json:
-            output.say(_json(_failure(job.config, error)))
+            output.say_json(_failure(job.config, error))
         return error
     _show(summary, job, options)
     return FracctlError(str(summary["error"])) if summary.get("error") else None
@@ -149,7 +147,7 @@ def _run(job: _Job, options: argparse.Namespace, executors: Executors) -> Except
 
 def _show(summary: dict[str, Any], job: _Job, options: argparse.Namespace) -> None:
     if options.json:
-        output.say(_json(summary))
+        output.say_json(summary)
         return
     stored = ", stored already" if summary.get("reused") else ""
     output.say(f"{summary['experiment']}{stored}")
@@ -191,15 +189,3 @@ def _failure(config: RunConfig, error: Exception) -> dict[str, Any]:
     """The JSON of a run that gave no result."""
     found = {"experiment": config.name, "status": "failed", "reused": False, "error": sentence(error)}
     return {key: found.get(key) for key in _KEYS}
-
-
-def _json(summary: dict[str, Any]) -> str:
-    return json.dumps(_finite(summary), ensure_ascii=False, allow_nan=False, default=str)
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {str(key): _finite(entry) for key, entry in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(entry) for entry in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value

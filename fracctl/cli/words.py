@@ -25,7 +25,19 @@ _DRAWN = ("dispersions", "samples", "first_sample")
 
 def explain(config: RunConfig, evaluation: Evaluation, survey: Survey) -> list[str]:
     """Return the lines that explain a run."""
-    rows = [
+    return [config.name, *table([[name, text] for name, text in _rows(config, evaluation, survey)])]
+
+
+def parts(config: RunConfig, evaluation: Evaluation, survey: Survey) -> dict[str, Any]:
+    """Return the same as plain data: `run_directory`, `words` by what they explain, and the `configuration`."""
+    words: dict[str, list[str]] = {}
+    for name, text in _rows(config, evaluation, survey):
+        words.setdefault(name or next(reversed(words)), []).append(text)
+    return {"run_directory": str(_directory(config)), "words": words, "configuration": config.model_dump(mode="json")}
+
+
+def _rows(config: RunConfig, evaluation: Evaluation, survey: Survey) -> list[_Row]:
+    return [
         *_plant(config, evaluation.plant),
         *_spacecraft(config),
         *_law(config, evaluation),
@@ -41,7 +53,6 @@ def explain(config: RunConfig, evaluation: Evaluation, survey: Survey) -> list[s
         ("figures", ", ".join(config.figures) or "none"),
         ("stored in", str(_directory(config))),
     ]
-    return [config.name, *table([[name, text] for name, text in rows])]
 
 
 def _evaluated(config: RunConfig) -> str:

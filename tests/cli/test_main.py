@@ -59,7 +59,7 @@ def test_without_a_command_the_help_goes_to_standard_error(capsys: pytest.Captur
         (["list", "contoller"], "there is no group 'contoller'; did you mean 'controller'?"),
         (["list", "plant", "solver"], "'list' takes one group"),
         (["list", "runs", "here"], "'list runs' takes output_dir=DIR only"),
-        (["validate", "--json"], "unknown option '--json'"),
+        (["validate", "--fresh"], "unknown option '--fresh'"),
     ],
 )
 def test_wrong_command_lines(capsys: pytest.CaptureFixture[str], words: list[str], said: str) -> None:
