@@ -61,7 +61,7 @@ def _searched(survey: Mapping[str, Any], parameters: Sequence[Parameter]) -> Ite
         name, kind = parameter.name, f"{parameter.kind}s"
         if name in axes:
             values = axis_values(axes[name], name)
-            if len(values) > 1:
+            if len(values) > 2:  # two are a choice, not a search
                 yield name, (parameter, float(values.min()), float(values.max()), f"survey.axes.{name}")
         elif isinstance(bounds, Mapping) and (name in bounds or kind in bounds):
             key = name if name in bounds else kind
