@@ -132,8 +132,8 @@ class Results:
     @cached_property
     def flies_laws(self) -> bool:
         """Whether the run has flown several laws and kept their paths."""
-        evaluation = self.configuration["evaluation"]
-        return evaluation["type"] == "flight" and (self.run.path / "paths.parquet").exists()
+        evaluation = self.configuration.get("evaluation") or {}
+        return evaluation.get("type") == "flight" and (self.run.path / "paths.parquet").exists()
 
     @cached_property
     def scales(self) -> Scales | None:
