@@ -36,7 +36,9 @@ def lessons(
         configuration: of the run; `survey` and `spacecraft` are read.
         found: results by objective and initial condition, with their `optimum`.
     """
-    searched = dict(_searched(configuration["survey"], _parameters(evaluation)))
+    survey = configuration.get("survey") or {}
+    searches = survey.get("axes") or survey.get("bounds")
+    searched = dict(_searched(survey, _parameters(evaluation))) if searches else {}
     mass = (configuration.get("spacecraft") or {}).get("mass_kg")
     for result in found:
         optimum = result["optimum"]
@@ -83,9 +85,11 @@ def _sensitivity(evaluation: Evaluation, optimum: Mapping[str, Any]) -> Iterator
     """Yield how much the settling time changes where one gain is off."""
     measures: tuple[Any, ...] = evaluation.measures
     measure = next((measure for measure in measures if isinstance(measure, SettlingTime)), None)
-    gains = [parameter.name for parameter in _parameters(evaluation) if parameter.kind == "gain"]
     settled = optimum.get(SettlingTime.name)
-    if measure is None or not gains or settled is None or not math.isfinite(settled):
+    if measure is None or settled is None or not math.isfinite(settled):
+        return
+    gains = [parameter.name for parameter in _parameters(evaluation) if parameter.kind == "gain"]
+    if not gains:
         return
     changes = [(name, sign) for name in gains for sign in (OFF, -OFF)]
     design = {name: np.full(1 + len(changes), float(optimum[name])) for name in evaluation.design_variables}
