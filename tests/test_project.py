@@ -147,7 +147,12 @@ def test_documents_show_what_comes_out(name: str) -> None:
 
 
 @pytest.mark.parametrize("command", README_COMMANDS)
-def test_commands_of_the_readme_are_valid(command: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+def test_commands_of_the_readme_are_valid(
+    command: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    if command[0] != "init":
+        assert main(["init", "my_study"]) == 0
     compose_only = ["--cfg", "job"] if command[0] == "run" else []
     assert main([word for word in command if word != "--json"] + compose_only) == 0, capsys.readouterr().err
 

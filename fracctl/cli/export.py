@@ -34,6 +34,7 @@ def parser() -> Parser:
     parser = Parser("export", "--to DIR [OVERRIDE …]", _DESCRIPTION, _EXAMPLES)
     parser.add_overrides()
     parser.add_config_dir()
+    parser.add_json("one JSON object: what was written, and where")
     parser.add_argument("--to", type=Path, metavar="DIR", required=True, help="directory to write to")
     parser.add_argument("--period-s", type=float, default=10.0, metavar="S", help="sample period in s (default: 10)")
     parser.add_argument(
@@ -92,6 +93,17 @@ def execute(options: argparse.Namespace) -> int:
             "all gains of the controller are 0; set those that shall fly, as controller.k_p_w=0.85"
         )
     paths = exported.write(options.to)
+    if options.json:
+        output.say_json(
+            {
+                "description": exported.description,
+                "states": exported.controller.n_states,
+                "operations": exported.controller.operations,
+                "gains": list(exported.gains),
+                "files": [str(path) for path in paths],
+            }
+        )
+        return 0
     output.say(exported.description)
     output.say(f"{exported.controller.n_states} states, {exported.controller.operations} multiply-adds a step")
     for gain in exported.gains:

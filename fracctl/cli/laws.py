@@ -5,23 +5,40 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from fracctl.cli.table import number, table
+from fracctl.cli.table import TURN, number, table
 
 Record = Mapping[str, Any]
 
+MOST_COLUMNS = 6
+"""More laws than this stand below each other."""
 _TIMES = ("_orbits", "_periods")
+_UNITS = ("orbits", "min")
 _SPREAD = ("quantile_05", "median", "quantile_95")
 
 
 def law_lines(records: Sequence[Record]) -> list[str]:
-    """Return a part for each initial condition: a column for each law, a row for each measure."""
+    """Return a part for each initial condition: a column for each law, a row for each measure; turned if too wide."""
     lines = []
     for condition in dict.fromkeys(record["initial_condition"] for record in records):
         own = [record for record in records if record["initial_condition"] == condition]
-        names = [name for name in own[0] if name not in ("initial_condition", "law")]
-        head = [str(condition), *(str(record["law"]) for record in own)]
-        lines += table([head, *([name, *(_cell(name, record[name]) for record in own)] for name in names)])
+        head = [_heading(own[0]), *(str(record["law"]) for record in own)]
+        rows = [head, *([name, *(_cell(name, record) for record in own)] for name in _names(own))]
+        lines += table(rows if len(own) <= MOST_COLUMNS else list(zip(*rows, strict=True)))
     return lines
+
+
+def _heading(record: Record) -> str:
+    """The start, and the stage of flights."""
+    return ", ".join(str(record[name]) for name in ("initial_condition", "stage") if name in record)
+
+
+def _names(records: Sequence[Record]) -> list[str]:
+    """Columns that are shown: settling to a band once, in all its units; the status where one is not ok."""
+    names = dict.fromkeys(name for record in records for name in record)
+    fine = all(record.get("status", "ok") == "ok" for record in records)
+    hidden = {"initial_condition", "law", "stage", *(["status"] if fine else ())}
+    hidden |= {f"{name}_{unit}" for name in names for unit in _UNITS if f"{name}_{unit}" in names}
+    return [name for name in names if name not in hidden]
 
 
 def quantile_lines(records: Sequence[Record]) -> list[str]:
@@ -96,8 +113,16 @@ def _cells(record: Record) -> Iterator[str]:
         yield number(record[f"{name}_sample"])
 
 
-def _cell(name: str, value: Any) -> str:
+def _cell(name: str, record: Record) -> str:
     """Five digits; times that do not come are none in JSON."""
+    if name not in record:
+        return ""
+    if f"{name}_orbits" in record:
+        orbits, minutes = record[f"{name}_orbits"], record[f"{name}_min"]
+        return "never" if orbits is None else f"{orbits:.3f} orbits, {minutes:.1f} min"
+    value = record[name]
+    if name == "settling_time" and value is not None:
+        return f"{number(value, 5)} = {value / TURN:.4f} T"
     return "never" if value is None and name.endswith(_TIMES) else number(value, 5)
 
 

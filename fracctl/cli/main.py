@@ -6,19 +6,22 @@ import sys
 from collections.abc import Sequence
 from types import ModuleType
 
-from fracctl.cli import export, listing, output, reproduce, resume, run, show, validate
+from fracctl.cli import compare, completion, export, init, listing, output, reproduce, resume, run, show, validate
 from fracctl.cli.failure import report
 from fracctl.errors import UsageError, suggestion
 
 INTERRUPTED = 130
 COMMANDS: dict[str, ModuleType] = {
+    "init": init,
     "run": run,
     "resume": resume,
+    "compare": compare,
     "reproduce": reproduce,
     "list": listing,
     "show": show,
     "validate": validate,
     "export": export,
+    "completion": completion,
 }
 
 _HELP = """\
@@ -38,6 +41,7 @@ a first run:
   fracctl list experiments                   what there is to run
   fracctl run experiment=ic1_outofplane      the best gains and order from IC1, stored and drawn in seconds
   fracctl show experiment=ic1_outofplane     what that computes, in words and units
+  fracctl init my_study                      a study to change: the orbit, the start, several laws
 
 exit codes: 0 done, 1 a run failed or a published number does not come out as it must, 2 wrong command line,
             3 wrong configuration, 130 interrupted
@@ -78,6 +82,9 @@ def _dispatch(words: list[str]) -> int:
         return 0
     if first not in COMMANDS:
         raise UsageError(_unknown(first))
+    if first == "completion" and rest[:1] == [completion.COMPLETE]:
+        completion.show_candidates(" ".join(rest[1:]), COMMANDS)
+        return 0
     command = COMMANDS[first]
     code: int = command.execute(command.parser().parse(rest))
     return code

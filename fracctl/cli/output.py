@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
+import math
 import os
 import sys
-from typing import TextIO
+from typing import Any, TextIO
 
 
 def prepare() -> None:
@@ -18,6 +20,19 @@ def prepare() -> None:
 def say(text: str = "") -> None:
     """Write a line to standard output at once; nothing happens where nobody reads it."""
     _write(sys.stdout, text + "\n")
+
+
+def say_json(value: Any) -> None:
+    """Write a value as one line of JSON; numbers that JSON cannot hold become null."""
+    say(json.dumps(_finite(value), ensure_ascii=False, allow_nan=False, default=str))
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {str(key): _finite(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(entry) for entry in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def remark(text: str) -> None:

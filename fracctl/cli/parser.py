@@ -39,12 +39,18 @@ class Parser(argparse.ArgumentParser):
             "--config-dir",
             type=Path,
             metavar="DIR",
-            help="a directory of your own YAML files, laid out as conf/; they win over built-in ones of the same name",
+            help="a directory of your own YAML files, laid out as conf/; they win over built-in ones of the same name "
+            "(default: $FRACCTL_CONFIG_DIR)",
         )
+
+    def add_json(self, what: str) -> None:
+        """Add --json."""
+        self.add_argument("--json", action="store_true", help=f"{what}, and nothing else")
 
     def add_overrides(self, **further: str) -> None:
         """Add the positional arguments group=option and key=value."""
         text = "group=option, group.key=value, or ~group.key to remove a key ('fracctl list' names groups and options)"
+        text += "; or the name of a study, my_study for my_study.yaml"
         self.add_argument("overrides", nargs="*", metavar="OVERRIDE", help=further.get("help", text))
 
     def parse(self, arguments: Sequence[str]) -> argparse.Namespace:
@@ -57,6 +63,11 @@ class Parser(argparse.ArgumentParser):
         for word in unknown:
             raise UsageError(f"unknown option '{word}'{suggestion(word.partition('=')[0], self.flags)}")
         return options
+
+    @property
+    def arguments(self) -> list[argparse.Action]:
+        """All arguments, as they were added."""
+        return list(self._actions)
 
     @property
     def flags(self) -> list[str]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
@@ -40,7 +39,7 @@ def parser() -> Parser:
     """Return the command's parser."""
     parser = Parser("reproduce", "[PAPER | PAPER/SECTION …]", _DESCRIPTION, _EXAMPLES)
     parser.add_argument("names", nargs="*", metavar="PAPER[/SECTION]", help="a folder of experiments/, or a part of it")
-    parser.add_argument("--json", action="store_true", help="one JSON object a line for each section, and nothing else")
+    parser.add_json("one JSON object a line for each section")
     parser.add_argument("--quiet", action="store_true", help="no progress on standard error, no notes")
     return parser
 
@@ -109,11 +108,11 @@ def _section(suite: Suite, section: str, options: argparse.Namespace, executors:
         write(result)
     except Exception as error:  # noqa: BLE001 - the other sections go on
         if options.json:
-            output.say(_json({"paper": suite.name, "section": section, "error": sentence(error)}))
+            output.say_json({"paper": suite.name, "section": section, "error": sentence(error)})
         return report(error, options.debug, f"{name}: ")
     failure = _failure(result)
     if options.json:
-        output.say(_json(_plain(result, failure)))
+        output.say_json(_plain(result, failure))
     else:
         _show(result, options.quiet)
     return 0 if failure is None else report(failure, options.debug)
@@ -180,7 +179,3 @@ def _plain(result: Reproduction, failure: RunError | None) -> dict[str, Any]:
         "error": None if failure is None else str(failure),
         "rows": records(result),
     }
-
-
-def _json(content: dict[str, Any]) -> str:
-    return json.dumps(content, ensure_ascii=False, allow_nan=False)

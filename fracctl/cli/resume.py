@@ -9,7 +9,7 @@ from typing import Any
 from fracctl.cli import output
 from fracctl.cli.failure import report
 from fracctl.cli.parser import Parser
-from fracctl.cli.showing import Job, add_display_options, compute_and_show, to_json
+from fracctl.cli.showing import Job, add_display_options, compute_and_show
 from fracctl.errors import UsageError
 
 SUMMARY = "continue a stored run: what was interrupted, is damaged, or failed"
@@ -55,7 +55,7 @@ def execute(options: argparse.Namespace) -> int:
 
 def _say_finished(summary: Mapping[str, Any], options: argparse.Namespace) -> int:
     if options.json:
-        output.say(to_json(summary))
+        output.say_json(summary)
     else:
         output.say(f"{summary['experiment']} is finished already; nothing was computed")
         output.say(str(summary["run_directory"]))

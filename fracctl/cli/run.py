@@ -31,6 +31,7 @@ it, outputs/multirun/<id>/summary.parquet; with --json its path stands in every 
 
 _EXAMPLES = """\
   fracctl run experiment=ic1_outofplane                           the best gains and order from IC1
+  fracctl run my_study                                            the file my_study.yaml, which 'fracctl init' writes
   fracctl run experiment=ic1_outofplane objective=st_os_u         for another objective
   fracctl run controller.alpha_w=0.91 controller.k_p_w=0.85       one design point
   fracctl run survey=out_of_plane survey.axes.alpha_w=0.9:1:0.02  another axis, both ends included
@@ -41,7 +42,7 @@ _EXAMPLES = """\
 
 def parser() -> Parser:
     """Return the command's parser."""
-    parser = Parser("run", "[OVERRIDE …]", _DESCRIPTION, _EXAMPLES)
+    parser = Parser("run", "[STUDY] [OVERRIDE …]", _DESCRIPTION, _EXAMPLES)
     parser.add_overrides()
     parser.add_argument("-m", "--multirun", action="store_true", help="one run for each of the values key=a,b,c")
     parser.add_argument(

@@ -21,20 +21,24 @@ _EXAMPLES = """\
 
 def parser() -> Parser:
     """Return the command's parser."""
-    parser = Parser("show", "[OVERRIDE …]", _DESCRIPTION, _EXAMPLES)
+    parser = Parser("show", "[STUDY] [OVERRIDE …]", _DESCRIPTION, _EXAMPLES)
     parser.add_overrides()
     parser.add_config_dir()
+    parser.add_json("one JSON object with the words and the configuration")
     return parser
 
 
 def execute(options: argparse.Namespace) -> int:
     """Do what the command line asks for and return the exit code."""
-    from fracctl.cli.words import explain
+    from fracctl.cli.words import explain, parts
     from fracctl.config.build import build_checked
     from fracctl.config.compose import compose
 
     config = compose(options.overrides, options.config_dir)
     evaluation, survey = build_checked(config)
+    if options.json:
+        output.say_json({"name": config.name, **parts(config, evaluation, survey)})
+        return 0
     for line in explain(config, evaluation, survey):
         output.say(line)
     return 0

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -62,7 +60,7 @@ class Ended:
 
 def add_display_options(parser: Parser) -> None:
     """Add --json and --quiet."""
-    parser.add_argument("--json", action="store_true", help="one JSON object a line for each run, and nothing else")
+    parser.add_json("one JSON object a line for each run")
     parser.add_argument("--quiet", action="store_true", help="no progress on standard error, no notes")
 
 
@@ -73,7 +71,7 @@ def compute_and_show(job: Job, options: argparse.Namespace, compute: Callable[[P
         summary = compute(progress).summary
     except Exception as error:  # noqa: BLE001 - the other runs go on
         if options.json:
-            output.say(to_json({**_failure(job.config, error), **job.further}))
+            output.say_json({**_failure(job.config, error), **job.further})
         return Ended(None, error)
     _show(summary, job, options)
     return Ended(summary, FracctlError(str(summary["error"])) if summary.get("error") else None)
@@ -81,7 +79,7 @@ def compute_and_show(job: Job, options: argparse.Namespace, compute: Callable[[P
 
 def _show(summary: dict[str, Any], job: Job, options: argparse.Namespace) -> None:
     if options.json:
-        output.say(to_json({**summary, **job.further}))
+        output.say_json({**summary, **job.further})
         return
     stored = ", stored already" if summary.get("reused") else ""
     output.say(f"{summary['experiment']}{stored}{lacking(summary)}")
@@ -105,7 +103,7 @@ def _lines(summary: dict[str, Any], config: RunConfig) -> list[str]:
     if "comparison" in tables:
         return comparison_lines(tables["comparison"], config.objectives[config.objective] == ["settling_time"])
     if "laws" in tables:
-        return law_lines(tables["laws"])
+        return law_lines(tables["laws"]) + survival_lines(tables.get("survival", []))
     if "survival" in tables:
         return survival_lines(tables["survival"])
     if "quantiles" in tables:
@@ -125,16 +123,3 @@ def _failure(config: RunConfig, error: Exception) -> dict[str, Any]:
     """The JSON of a run that gave no result."""
     found = {"experiment": config.name, "status": "failed", "reused": False, "error": sentence(error)}
     return {key: found.get(key) for key in _KEYS}
-
-
-def to_json(summary: Mapping[str, Any]) -> str:
-    """Return a line of JSON; numbers that are not finite are null."""
-    return json.dumps(_finite(dict(summary)), ensure_ascii=False, allow_nan=False, default=str)
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {str(key): _finite(entry) for key, entry in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(entry) for entry in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from fracctl.cli import output
 from fracctl.cli.parser import Parser
 from fracctl.cli.table import count
-from fracctl.errors import RunError
+from fracctl.errors import ConfigurationError, RunError
 
 if TYPE_CHECKING:
     from fracctl.store import RunDirectory
@@ -32,29 +32,44 @@ _EXAMPLES = """\
 
 def parser() -> Parser:
     """Return the command's parser."""
-    parser = Parser("validate", "[OVERRIDE … | RUN_DIR]", _DESCRIPTION, _EXAMPLES)
+    parser = Parser("validate", "[STUDY] [OVERRIDE …] | RUN_DIR", _DESCRIPTION, _EXAMPLES)
     parser.add_overrides(help="as for 'fracctl run', or the directory of a stored run")
     parser.add_config_dir()
+    parser.add_json("one JSON object: whether it is valid, and what is wrong")
     return parser
 
 
 def execute(options: argparse.Namespace) -> int:
     """Do what the command line asks for and return the exit code."""
     words: list[str] = options.overrides
-    if len(words) == 1 and "=" not in words[0] and Path(words[0]).is_dir():
-        return _validate_run(Path(words[0]))
+    stored = len(words) == 1 and "=" not in words[0] and Path(words[0]).is_dir()
+    try:
+        found, sentence = _run(Path(words[0])) if stored else _configuration(words, options.config_dir)
+    except (ConfigurationError, RunError) as error:
+        if options.json:
+            output.say_json({"valid": False, "problems": str(error).splitlines()})
+        raise
+    if options.json:
+        output.say_json({"valid": True, "problems": [], **found})
+    else:
+        output.say(f"valid: {sentence}")
+    return 0
+
+
+def _configuration(words: list[str], config_dir: Path | None) -> tuple[dict[str, Any], str]:
+    """Return what is found, as data and in words."""
     from fracctl.cli.words import extent
     from fracctl.config.build import build_checked
     from fracctl.config.compose import compose
 
-    config = compose(words, options.config_dir)
+    config = compose(words, config_dir)
     evaluation, survey = build_checked(config)
-    conditions = count(len(evaluation.initial_conditions), "initial condition")
-    output.say(f"valid: {config.name}, {extent(survey)}, {conditions}")
-    return 0
+    names = list(evaluation.initial_conditions)
+    found = {"name": config.name, "points": survey.n_points, "initial_conditions": names}
+    return found, f"{config.name}, {extent(survey)}, {count(len(names), 'initial condition')}"
 
 
-def _validate_run(path: Path) -> int:
+def _run(path: Path) -> tuple[dict[str, Any], str]:
     from fracctl.store import RunDirectory
 
     directory = RunDirectory(path)
@@ -63,8 +78,8 @@ def _validate_run(path: Path) -> int:
     problems = [f"{path}: {line}" for line in damage] or list(_unfinished(path, directory, content))
     if problems:
         raise RunError("\n".join([*problems, _cure(path, directory)]))
-    output.say(f"valid: {path} is finished, and every file is as it was written")
-    return 0
+    found = {"run_directory": str(directory.path), "status": content["status"]}
+    return found, f"{path} is finished, and every file is as it was written"
 
 
 def _unfinished(path: Path, directory: RunDirectory, content: Mapping[str, Any]) -> Iterator[str]:

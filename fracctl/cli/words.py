@@ -24,7 +24,20 @@ _DRAWN = ("dispersions", "samples", "first_sample")
 
 def explain(config: RunConfig, evaluation: Evaluation, survey: Survey) -> list[str]:
     """Return the lines that explain a run."""
-    rows = [
+    return [config.name, *table([[name, text] for name, text in _rows(config, evaluation, survey)])]
+
+
+def parts(config: RunConfig, evaluation: Evaluation, survey: Survey) -> dict[str, Any]:
+    """Return the same as plain data: `run_directory`, `words` by what they explain, and the `configuration`."""
+    words: dict[str, list[str]] = {}
+    for name, text in _rows(config, evaluation, survey):
+        words.setdefault(name or next(reversed(words)), []).append(text)
+    plain = config.model_dump(mode="json")
+    return {"run_directory": str(directory_of(plain).path), "words": words, "configuration": plain}
+
+
+def _rows(config: RunConfig, evaluation: Evaluation, survey: Survey) -> list[_Row]:
+    return [
         *_plant(config, evaluation.plant),
         *_spacecraft(config),
         *_law(config, evaluation),
@@ -40,7 +53,6 @@ def explain(config: RunConfig, evaluation: Evaluation, survey: Survey) -> list[s
         ("figures", ", ".join(config.figures) or "none"),
         ("stored in", str(directory_of(config.model_dump(mode="json")).path)),
     ]
-    return [config.name, *table([[name, text] for name, text in rows])]
 
 
 def _evaluated(config: RunConfig) -> str:

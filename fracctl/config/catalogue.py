@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import os
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from fracctl.config.registry import entry_points, load_entry_point
@@ -10,6 +11,9 @@ from fracctl.errors import ConfigurationError, suggestion
 
 SEVERAL_ALLOWED = frozenset({"initial_condition", "figures"})
 """Groups of which a run may take several options, or (figures) none."""
+
+OWN_DIRECTORY = "FRACCTL_CONFIG_DIR"
+"""Environment variable with the user's directory, where the command line names none."""
 
 _PACKAGE = Path(__file__).resolve().parent.parent
 
@@ -19,6 +23,8 @@ class Catalogue:
     """Groups and their options in one or several directories; a file in an earlier directory hides later ones."""
 
     directories: tuple[Path, ...]
+    study: Path | None = None
+    """A file that stands for the experiment of its name."""
 
     def groups(self) -> tuple[str, ...]:
         """Names of all groups, sorted."""
@@ -28,11 +34,14 @@ class Catalogue:
     def options(self, group: str) -> tuple[str, ...]:
         """Names of a group's options, sorted; those in a subdirectory read ``folder/name``."""
         roots = [directory / group for directory in self.directories]
-        found = {path.relative_to(root).with_suffix("") for root in roots for path in root.rglob("*.yaml")}
-        return tuple(sorted(path.as_posix() for path in found))
+        found = {path.relative_to(root).with_suffix("").as_posix() for root in roots for path in root.rglob("*.yaml")}
+        own = {self.study.stem} if self.study is not None and group == "experiment" else set()
+        return tuple(sorted(found | own))
 
     def file(self, config_path: str) -> Path | None:
         """The file of e.g. ``plant/hcw``, None if there is none."""
+        if self.study is not None and config_path == f"experiment/{self.study.stem}":
+            return self.study
         candidates = (directory / f"{config_path}.yaml" for directory in self.directories)
         return next((path for path in candidates if path.is_file()), None)
 
@@ -56,14 +65,21 @@ class Catalogue:
             raise ConfigurationError(f"there is no {group.replace('_', ' ')} '{option}'{hint}")
 
 
-def catalogue(config_dir: Path | None = None) -> Catalogue:
-    """The user's directory, if any, the built-in one, and those of installed extensions, in this order.
+def catalogue(config_dir: Path | None = None, study: Path | None = None) -> Catalogue:
+    """The user's study and directory, if any, the built-in one, and those of installed extensions, in this order.
 
     Raises:
-        ConfigurationError: a directory does not exist.
+        ConfigurationError: a directory does not exist, or the study has the name of an experiment.
     """
+    if config_dir is None and os.environ.get(OWN_DIRECTORY):
+        config_dir = Path(os.environ[OWN_DIRECTORY])
     own = [] if config_dir is None else [_existing(config_dir)]
-    return Catalogue((*own, built_in_directory(), *_extensions()))
+    found = Catalogue((*own, built_in_directory(), *_extensions()))
+    if study is None:
+        return found
+    if study.stem in found.options("experiment"):
+        raise ConfigurationError(f"'{study.name}' has the name of an experiment that there is already; rename the file")
+    return replace(found, study=study)
 
 
 def built_in_directory() -> Path:

@@ -15,6 +15,7 @@ from hydra import version
 from hydra._internal.config_search_path_impl import ConfigSearchPathImpl
 from hydra._internal.hydra import Hydra
 from hydra.core.config_loader import ConfigLoader
+from hydra.core.config_store import ConfigStore
 from hydra.core.global_hydra import GlobalHydra
 from hydra.core.override_parser.overrides_parser import OverridesParser
 from hydra.core.override_parser.types import Override as HydraOverride
@@ -32,6 +33,7 @@ from fracctl.config.messages import InvalidConfiguration, problems
 from fracctl.config.origins import Origins
 from fracctl.config.overrides import Override, check, for_hydra
 from fracctl.config.schemas import RunConfig
+from fracctl.config.studies import studies_here, study_file, with_study
 from fracctl.config.yaml_traps import traps
 from fracctl.errors import ConfigurationError, UsageError, suggestion
 
@@ -46,14 +48,16 @@ def compose(overrides: Sequence[str], config_dir: Path | None = None) -> RunConf
     """Compose and validate one run.
 
     Args:
-        overrides: ``group=option``, ``key=value`` or ``~key``; the grammar is Hydra's.
+        overrides: ``group=option``, ``key=value`` or ``~key``; the grammar is Hydra's. A word without ``=`` names a
+            file that stands for the experiment.
         config_dir: a further directory of YAML files; they win over built-in ones of the same name.
 
     Raises:
         UsageError: a word is no override, or names several runs.
         ConfigurationError: the configuration is wrong; an InvalidConfiguration lists everything that is.
     """
-    found = catalogue(config_dir)
+    overrides, study = with_study(overrides)
+    found = catalogue(config_dir, study)
     with _hydra(found) as loader:
         parsed = [_parse(text, loader, found) for text in overrides]
         check(parsed, found)
@@ -75,8 +79,8 @@ def expand_multirun(overrides: Sequence[str], config_dir: Path | None = None) ->
     """
     found = catalogue(config_dir)
     with _hydra(found) as loader:
-        parsed = [_parse(text, loader, found) for text in overrides]
-    choices = []
+        parsed = [_parse(text, loader, found) for text in overrides if study_file(text) is None]
+    choices = [[text] for text in overrides if study_file(text) is not None]
     for override in parsed:
         if override.sweep is None:
             choices.append([override.text])
@@ -105,15 +109,29 @@ def _hydra(found: Catalogue) -> Iterator[ConfigLoader]:
         Plugins.instance()
         path = ConfigSearchPathImpl()
         path.append("hydra", "pkg://hydra.conf")
+        if found.study is not None:
+            ConfigStore.instance().store(found.study.stem, _read(found.study), "experiment", "_global_")
         for directory in found.directories:
             path.append("main", f"file://{directory}")
         path.append("schema", "structured://")
         Hydra.create_main_hydra2("fracctl", path)
         yield GlobalHydra.instance().config_loader()
     finally:
+        if found.study is not None:
+            ConfigStore.instance().repo.get("experiment", {}).pop(f"{found.study.stem}.yaml", None)
         for kind in ours:
             Singleton._instances.pop(kind, None)
         Singleton._instances.update(saved)
+
+
+def _read(study: Path) -> DictConfig:
+    try:
+        content = OmegaConf.load(study)
+    except Exception as error:
+        raise ConfigurationError(_reason(error)) from error
+    if not isinstance(content, DictConfig):
+        raise ConfigurationError(f"{study.name}: must be a mapping of keys, as 'fracctl init' writes it")
+    return content
 
 
 def _load(words: list[str], loader: ConfigLoader, found: Catalogue) -> tuple[dict[str, Any], list[tuple[str, str]]]:
@@ -157,8 +175,10 @@ def _require_text_keys(data: Any, path: str) -> None:
 
 def _parse(text: str, loader: ConfigLoader, found: Catalogue) -> Override:
     if "=" not in text and not text.startswith("~"):
-        hint = suggestion(text, found.options("experiment")).replace("'", "'experiment=", 1)
-        raise UsageError(f"'{text}' is not an override; write KEY=VALUE{hint}")
+        near = suggestion(text, studies_here())
+        hint = near or suggestion(text, found.options("experiment")).replace("'", "'experiment=", 1)
+        name = f"{text.removesuffix('.yaml')}.yaml"
+        raise UsageError(f"'{text}' is neither an override, KEY=VALUE, nor a study, for there is no {name}{hint}")
     try:
         parsed = OverridesParser.create().parse_override(text)
         parsed.config_loader = loader  # for glob(…)

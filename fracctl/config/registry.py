@@ -7,7 +7,7 @@ An extension declares, for instance::
 
 and `type: my_plant` works wherever `hcw` does. The options are the arguments of the class, with their annotations and
 defaults; an `ArgumentError` from the constructor is reported under the option's name. A survey is called with the
-keywords `evaluation` and `seed` besides its options.
+keywords `evaluation` and `seed` besides its options; a figure is a function of a run's results and of what is selected.
 """
 
 from __future__ import annotations
@@ -65,6 +65,7 @@ BUILT_IN: Mapping[str, Mapping[str, str]] = {
         "delta_v": "fracctl.measures.fuel:DeltaV",
         "station_keeping": "fracctl.measures.fuel:StationKeeping",
         "peak_thrust": "fracctl.measures.fuel:PeakThrust",
+        "peak_force": "fracctl.measures.fuel:PeakForce",
         "propellant": "fracctl.measures.fuel:Propellant",
         "hold_error": "fracctl.measures.hold_error:HoldError",
         "overshoot_m": "fracctl.measures.overshoot_m:OvershootM",
@@ -100,6 +101,30 @@ BUILT_IN: Mapping[str, Mapping[str, str]] = {
         "continuation": "fracctl.surveys:Continuation",
         "search": "fracctl.surveys:PopulationSearch",
         "comparison": "fracctl.comparison:Comparison",
+    },
+    "figures": {
+        "gain_contours": "fracctl.figures.gain_contours:build",
+        "trajectories": "fracctl.figures.trajectories:build",
+        "objective_against_order": "fracctl.figures.objective_against_order:build",
+        "order_contours": "fracctl.figures.order_contours:build",
+        "pareto_fronts": "fracctl.figures.pareto_fronts:build",
+        "poles": "fracctl.figures.poles:build",
+        "bode": "fracctl.figures.bode:build",
+        "nyquist": "fracctl.figures.nyquist:build",
+        "work_precision": "fracctl.figures.work_precision:build",
+        "settling_against_band": "fracctl.figures.settling_against_band:build",
+        "settling_against_effort": "fracctl.figures.settling_against_effort:build",
+        "orbits": "fracctl.figures.orbits:build",
+        "feedback": "fracctl.figures.feedback:build",
+        "drift": "fracctl.figures.drift:build",
+        "multiplier_window": "fracctl.figures.multiplier_window:build",
+        "deployment": "fracctl.figures.deployment:build",
+        "settling_against_overshoot": "fracctl.figures.settling_against_overshoot:build",
+        "spread": "fracctl.figures.spread:build",
+        "survival": "fracctl.figures.survival:build",
+        "approach": "fracctl.figures.approach:build",
+        "position_error": "fracctl.figures.position_error:build",
+        "acceleration": "fracctl.figures.acceleration:build",
     },
     "conf": {},
 }

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, Field, PlainValidator, SerializeAsAny, ValidationInfo, model_validator
 from pydantic_core import InitErrorDetails
 
-from fracctl.config import parts
+from fracctl.config import parts, registry
 from fracctl.config.cluster import DaskScheduler
 from fracctl.config.evaluations import (
     AccuracyEvaluation,
@@ -76,33 +76,17 @@ class LocalScheduler(Typed):
     """Seconds that a block may take before its worker is killed; None for no limit."""
 
 
+def _figure_type(value: str) -> str:
+    known = registry.names("figures")
+    if value not in known:
+        raise refuse(refusal((), value, f"must be one of {', '.join(known)}{suggestion(value, known)}"))
+    return value
+
+
 class Figure(Typed):
     """One figure of the run."""
 
-    type: Literal[
-        "gain_contours",
-        "trajectories",
-        "objective_against_order",
-        "order_contours",
-        "pareto_fronts",
-        "poles",
-        "bode",
-        "nyquist",
-        "work_precision",
-        "settling_against_band",
-        "settling_against_effort",
-        "orbits",
-        "feedback",
-        "drift",
-        "multiplier_window",
-        "deployment",
-        "settling_against_overshoot",
-        "spread",
-        "survival",
-        "approach",
-        "position_error",
-        "acceleration",
-    ]
+    type: Annotated[str, AfterValidator(_figure_type)]
     objective: str | None = None
     """Whose optima are shown; None for the primary one."""
     initial_conditions: list[str] | None = None

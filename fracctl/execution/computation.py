@@ -18,6 +18,7 @@ from fracctl.execution.drawing import draw_figures
 from fracctl.execution.executors import Executors
 from fracctl.execution.frequency_response import frequency_responses
 from fracctl.execution.gathering import Gathering
+from fracctl.execution.lessons import lessons
 from fracctl.execution.poles import COLUMNS as POLE_COLUMNS
 from fracctl.execution.poles import Poles
 from fracctl.execution.progress import Progress
@@ -127,14 +128,17 @@ class Computation:
         conclusion = self._conclude(check)
         self._trajectories()
         found = results(self._evaluation, optima)
-        tails = notes_on_tails(self._evaluation, found)
+        taught = [
+            *notes_on_tails(self._evaluation, found),
+            *lessons(self._evaluation, self._job.configuration, found),
+        ]
         undrawn = draw_figures(self._directory, self._job.configuration["figures"], missing(store.failed_points))
         check.finish()
         self._record.foreign_cpu_time_s += check.foreign_cpu_time_s
         notes = self._notes + notes_on(found, self._survey.baseline, tally)
         if store.damaged:
             notes.append(f"stored parts that could not be trusted and were computed again: {store.damaged}")
-        notes += [*tails, *check.notes(), *conclusion.notes, *undrawn]
+        notes += [*taught, *check.notes(), *conclusion.notes, *undrawn]
         identity = {
             "experiment": str(self._job.configuration["name"]),
             "run_id": self._record.run_id,

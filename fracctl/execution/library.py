@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from fracctl.config.compose import compose
+from fracctl.config.studies import study_file
 from fracctl.errors import IncompleteRunWarning
 from fracctl.execution.run import RunResult, execute
 
@@ -15,7 +16,7 @@ def run(experiment: str, overrides: Sequence[str] = (), *, config_dir: str | Pat
     """Run an experiment as the command line does; in this process unless `overrides` name a scheduler.
 
     Args:
-        experiment: name, e.g. ``ic1_outofplane``.
+        experiment: name, e.g. ``ic1_outofplane``, or file of a study, e.g. ``my_study.yaml``.
         overrides: as on the command line, e.g. ``["survey.axes.alpha_w=[0.91,1.0]"]``.
         config_dir: a directory of your own configuration files.
 
@@ -28,7 +29,8 @@ def run(experiment: str, overrides: Sequence[str] = (), *, config_dir: str | Pat
     """
     chosen = any(word.lstrip("+").startswith(("scheduler=", "scheduler@")) for word in overrides)
     default = [] if chosen else ["scheduler=serial"]
-    arguments = [f"experiment={experiment}", *default, *overrides]
+    chosen_run = experiment if study_file(experiment) else f"experiment={experiment}"
+    arguments = [chosen_run, *default, *overrides]
     result = execute(compose(arguments, None if config_dir is None else Path(config_dir)))
     if error := result.summary.get("error"):
         warnings.warn(f"{experiment}: {error}", IncompleteRunWarning, stacklevel=2)

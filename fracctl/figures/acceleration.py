@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from fracctl.arrays import Floats
 from fracctl.figures import labels
 from fracctl.figures.curves import Curve, curves_of
-from fracctl.figures.flight import LINES, largest_acceleration
+from fracctl.figures.flight import label, largest_acceleration, line
 from fracctl.figures.results import Results, Selection
 from fracctl.figures.style import FULL_WIDTH_IN, GREY
 
@@ -62,7 +62,7 @@ def _axis(ax: Axes, curves: Sequence[Curve], component: str, results: Results) -
     unit = 1.0 if results.scales is None else 1e3 * results.scales.acceleration_m_s2
     for curve in curves:
         values = unit * curve.samples[f"control_{component}"].to_numpy(float)
-        ax.plot(curve.times / math.tau, values, **LINES[curve.kind])
+        ax.plot(curve.times / math.tau, values, **line(curve))
     ax.axhline(0.0, color=GREY, linewidth=0.5, zorder=0)
     bound = largest_acceleration(results)
     for level in () if bound is None else (-unit * bound, unit * bound):
@@ -72,7 +72,7 @@ def _axis(ax: Axes, curves: Sequence[Curve], component: str, results: Results) -
 def _spent_so_far(ax: Axes, curves: Sequence[Curve], results: Results) -> None:
     unit = 1.0 if results.scales is None else results.scales.speed_m_s
     for curve in curves:
-        ax.plot(curve.times / math.tau, unit * spent(curve), label=labels.controller(curve.best), **LINES[curve.kind])
+        ax.plot(curve.times / math.tau, unit * spent(curve), label=label(curve), **line(curve))
     ax.set_ylim(bottom=0.0)
 
 

@@ -15,7 +15,7 @@ from matplotlib.patches import Rectangle
 from fracctl.arrays import Floats
 from fracctl.figures import labels
 from fracctl.figures.curves import Curve, curves_of, table_of
-from fracctl.figures.flight import LINES, bands, metres
+from fracctl.figures.flight import bands, label, line, metres
 from fracctl.figures.results import FigureError, Results, Selection
 from fracctl.figures.style import FULL_WIDTH_IN, GREY
 
@@ -70,7 +70,7 @@ def _plane(ax: Axes, results: Results, curves: Sequence[Curve], unit: tuple[floa
         times = np.linspace(0.0, end, _POINTS)
         along, down = curve.values(y, times) / unit[0], -curve.values(x, times) / unit[0]
         reach = max(reach, float(np.hypot(np.ptp(along), np.ptp(down))))
-        ax.plot(along, down, **LINES[curve.kind])
+        ax.plot(along, down, **line(curve))
         _ticks(ax, curve, (x, y), step * minute * np.arange(1.0, end / (step * minute)), unit[0])
         ax.plot(along[:1], down[:1], "o", color="black", markersize=3.0)
     for band in bands(results):
@@ -97,15 +97,15 @@ def _ticks(ax: Axes, curve: Curve, names: tuple[str, str], times: Floats, unit: 
     later = np.stack([curve.values(y, times + shift), -curve.values(x, times + shift)]) / unit
     for place, way in zip(places.T, (later - places).T, strict=True):
         angle = math.degrees(math.atan2(-way[1], way[0]))
-        ax.plot(*place, marker=(2, 2, angle), color=LINES[curve.kind]["color"], markersize=7.0, linestyle="none")
+        ax.plot(*place, marker=(2, 2, angle), color=line(curve)["color"], markersize=7.0, linestyle="none")
 
 
 def _across(ax: Axes, results: Results, curves: Sequence[Curve], unit: tuple[float, str], end: float) -> None:
     z = results.components[2]
     times = np.linspace(0.0, end, _POINTS)
     for curve in curves:
-        label = labels.controller(curve.best)
-        ax.plot(times / math.tau, -curve.values(z, times) / unit[0], label=label, **LINES[curve.kind])
+        words = label(curve)
+        ax.plot(times / math.tau, -curve.values(z, times) / unit[0], label=words, **line(curve))
     ax.axhline(0.0, color=GREY, linewidth=0.5, zorder=0)
     ax.set_xlabel(f"Time ({results.period_name})")
     ax.set_ylabel(rf"H-bar ($-{z}$) ({unit[1]})")

@@ -16,16 +16,18 @@ from fracctl.figures.results import FigureError, Results, Row, Selection, optimu
 
 @dataclass(frozen=True)
 class Curve:
-    """The trajectory of one optimum."""
+    """The trajectory of one optimum, or of one of several laws."""
 
     kind: str
     """baseline or overall."""
     best: Row
-    """The row of optima."""
+    """The row of optima, or of laws."""
     samples: pd.DataFrame
     """The rows of its trajectory, in the order of time."""
     components: tuple[str, ...]
     """Names of the positions."""
+    place: int | None = None
+    """Of the law among several, whose name is `kind` then."""
 
     @property
     def times(self) -> Floats:
@@ -60,11 +62,13 @@ class Curve:
 
 
 def curves_of(results: Results, selection: Selection, initial_condition: str) -> list[Curve]:
-    """Return the curves of baseline and overall optimum, only one where they are the same point.
+    """Return the curves of baseline and overall optimum, only one where they are the same point, or of all laws.
 
     Raises:
-        FigureError: neither has a stored trajectory.
+        FigureError: there is no stored trajectory.
     """
+    if results.flies_laws:
+        return _of_laws(results, initial_condition)
     curves: list[Curve] = []
     for kind in ("baseline", "overall"):
         best = optimum(results, selection, initial_condition, kind)
@@ -78,12 +82,27 @@ def curves_of(results: Results, selection: Selection, initial_condition: str) ->
     return curves
 
 
+def _of_laws(results: Results, initial_condition: str) -> list[Curve]:
+    paths, rows = (results.run.table(name) for name in ("paths", "laws"))
+    curves = []
+    for place, law in enumerate(results.configuration["evaluation"]["laws"]):
+        own, row = (t[(t["law"] == law) & (t["initial_condition"] == initial_condition)] for t in (paths, rows))
+        if not own.empty:
+            best = {str(name): value for name, value in row.iloc[0].items()}
+            curves.append(
+                Curve(law, best, own.drop(columns=["initial_condition", "law", "stage"]), results.components, place)
+            )
+    if not curves:
+        raise FigureError(f"no law has flown from '{initial_condition}'")
+    return curves
+
+
 def table_of(curves: Mapping[str, Sequence[Curve]]) -> pd.DataFrame:
     """Return the samples of all curves by initial condition, one after the other."""
     parts = []
     for initial_condition, pair in curves.items():
         for curve in pair:
-            part = curve.samples.drop(columns="run").reset_index(drop=True)
+            part = curve.samples.drop(columns="run", errors="ignore").reset_index(drop=True)
             part.insert(1, "periods", curve.times / math.tau)
             part.insert(0, "kind", curve.kind)
             part.insert(0, "initial_condition", initial_condition)

@@ -8,14 +8,31 @@ from typing import Any
 import numpy as np
 
 from fracctl.figures import labels
+from fracctl.figures.compared_laws import law_name
 from fracctl.figures.curves import Curve
 from fracctl.figures.results import Results
-from fracctl.figures.style import BLUE, ORANGE
+from fracctl.figures.style import BLUE, CYCLE, ORANGE
 
-LINES: dict[str, dict[str, Any]] = {
+_LINES: dict[str, dict[str, Any]] = {
     "baseline": {"color": ORANGE, "linestyle": (0, (4, 1.6)), "linewidth": 1.1},
     "overall": {"color": BLUE, "linestyle": "-", "linewidth": 1.1},
 }
+
+
+_DASHES: tuple[Any, ...] = ("-", (0, (4, 1.6)), (0, (1, 1.2)), (0, (4, 1.2, 1, 1.2)))
+
+
+def line(curve: Curve) -> dict[str, Any]:
+    """Return the look of a curve."""
+    if curve.place is None:
+        return _LINES[curve.kind]
+    dashes = _DASHES[curve.place // len(CYCLE) % len(_DASHES)]
+    return {"color": CYCLE[curve.place % len(CYCLE)], "linestyle": dashes, "linewidth": 1.1}
+
+
+def label(curve: Curve) -> str:
+    """Return what a legend says of a curve."""
+    return labels.controller(curve.best) if curve.place is None else law_name(curve.kind)
 
 
 def bands(results: Results) -> list[float]:

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from fracctl.arrays import Floats
 from fracctl.figures import labels
 from fracctl.figures.curves import Curve, curves_of
-from fracctl.figures.flight import LINES, bands
+from fracctl.figures.flight import bands, label, line
 from fracctl.figures.results import Results, Selection
 from fracctl.figures.style import FULL_WIDTH_IN, GREY
 
@@ -49,9 +49,7 @@ def build(results: Results, selection: Selection) -> tuple[Figure, pd.DataFrame]
 def _draw(ax: Axes, curves: Sequence[Curve], unit: float) -> None:
     for curve in curves:
         times = np.linspace(0.0, curve.times[-1], _POINTS)
-        ax.semilogy(
-            times / math.tau, unit * distance(curve, times), label=labels.controller(curve.best), **LINES[curve.kind]
-        )
+        ax.semilogy(times / math.tau, unit * distance(curve, times), label=label(curve), **line(curve))
 
 
 def distance(curve: Curve, times: Floats) -> Floats:

@@ -136,6 +136,12 @@ class Results:
         return "Time $s$" if kind.startswith("hcw") else named.get(kind, "Time $t$")
 
     @cached_property
+    def flies_laws(self) -> bool:
+        """Whether the run has flown several laws and kept their paths."""
+        evaluation = self.configuration.get("evaluation") or {}
+        return evaluation.get("type") == "flight" and (self.run.path / "paths.parquet").exists()
+
+    @cached_property
     def scales(self) -> Scales | None:
         """Lengths and times in SI units, where the plant has them."""
         scales: Scales | None = self.plant.scales

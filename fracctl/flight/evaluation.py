@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
-from functools import cached_property
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
+from typing import Any
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from fracctl.arrays import Array, Floats, joined
 from fracctl.dispersions import SAMPLE
 from fracctl.errors import ArgumentError, UnsupportedError, suggestion
 from fracctl.evaluation import COUNTERS, LAW_NUMBER, Conclusion, Evaluation
-from fracctl.flight import conclusion
+from fracctl.flight import beside, conclusion
 from fracctl.flight.measured import measured, names, takes
 from fracctl.flight.stages import CERTAIN, STAGES, Flown, Sampling, Stage, Surroundings
 from fracctl.loop import ClosedLoop
@@ -254,11 +255,26 @@ class FlightEvaluation(Evaluation):
         return rows | dict.fromkeys(COUNTERS, np.zeros(count, dtype=np.int64))
 
     def conclude(self, parts: Iterable[Mapping[str, Array]]) -> Conclusion:
-        """Return what survives of every law, stage by stage."""
+        """Return what survives of every law, stage by stage; of laws with one flight a stage, all that is measured."""
         rows = joined(list(parts))
         varied = [name for name in self.design_variables if name != LAW_NUMBER and np.unique(rows[name]).size > 1]
         groups = ["initial_condition", *([LAW] if self.laws else varied)]
-        return conclusion.conclude(rows, groups, self.measured_columns, self.bands_m)
+        found = conclusion.conclude(rows, groups, self.measured_columns, self.bands_m)
+        return self._beside(rows, found) if self.laws and len(self.flights) == len(self.stages) else found
+
+    def _beside(self, rows: Mapping[str, Array], found: Conclusion) -> Conclusion:
+        last = self.stages[-1]
+        laws = {beside.LAWS: beside.measured(rows, self.measured_columns, last)}
+        paths = list(beside.paths(rows, last, self.horizon, partial(self._path, last)))
+        tables = {**found.tables, **laws, **({beside.PATHS: paths} if paths else {})}
+        return replace(found, tables=tables, shown=laws | dict(found.shown if len(self.stages) > 1 else {}))
+
+    def _path(self, stage: Stage, design: Mapping[str, float], start: str, times: Floats) -> dict[str, Floats]:
+        if stage == "ideal":
+            return self.sampled(self.solve(design, start), times)
+        number = next(sample for other, sample in self.flights if other == stage)
+        flight: Any = replace(self.fly(start, stage, [number], design), batched=False)
+        return self.sampled(flight, np.minimum(times, flight.horizon))
 
 
 @dataclass(frozen=True)

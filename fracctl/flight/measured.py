@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from fracctl.arrays import Floats
-from fracctl.measures.fuel import DeltaV, PeakThrust, Propellant, StationKeeping, propellant_kg
+from fracctl.measures.fuel import DeltaV, PeakForce, PeakThrust, Propellant, StationKeeping, force_n, propellant_kg
 from fracctl.measures.hold_error import HoldError
 from fracctl.measures.in_units import TURN
 from fracctl.measures.settling_times import SettlingTimes
@@ -55,6 +55,11 @@ def _peak_thrust(measure: PeakThrust, flight: SampledTrajectory) -> Columns:
     return {measure.columns[0]: 1e3 * measure.scales.acceleration_m_s2 * np.abs(flight.commands).max(axis=(1, 2))}
 
 
+def _peak_force(measure: PeakForce, flight: SampledTrajectory) -> Columns:
+    peak = np.abs(flight.commands).max(axis=(1, 2)) * measure.scales.acceleration_m_s2
+    return {measure.columns[0]: force_n(measure.spacecraft, peak)}
+
+
 def _propellant(measure: Propellant, flight: SampledTrajectory) -> Columns:
     spent = np.asarray(delta_v(flight)) * measure.scales.speed_m_s
     return {measure.columns[0]: propellant_kg(measure.spacecraft, spent)}
@@ -74,6 +79,7 @@ _MEASURED: Mapping[Any, Callable[[Any, SampledTrajectory], Columns]] = {
     DeltaV: _delta_v,
     StationKeeping: _station_keeping,
     PeakThrust: _peak_thrust,
+    PeakForce: _peak_force,
     Propellant: _propellant,
     HoldError: _hold_error,
 }

@@ -89,6 +89,30 @@ class PeakThrust(InUnits):
         return {self.columns[0]: _MILLI * self.scales.acceleration_m_s2 * peak}
 
 
+class PeakForce(InUnits):
+    """The largest force of one axis, in newtons: the mass of `spacecraft` times the acceleration of `PeakThrust`."""
+
+    name = "peak_force"
+    columns = ("peak_force_n",)
+
+    def check(self) -> None:
+        """Raise ArgumentError unless everything is known."""
+        super().check()
+        if self.spacecraft.mass_kg is None:
+            raise ArgumentError("spacecraft.mass_kg", None, "must be given for this measure")
+
+    def __call__(self, trajectory: Trajectory) -> dict[str, Floats]:
+        """Return the column, (b,)."""
+        peak = PeakAcceleration()(trajectory)[PeakAcceleration.name] * self.scales.acceleration_m_s2
+        return {self.columns[0]: force_n(self.spacecraft, peak)}
+
+
+def force_n(craft: Spacecraft, acceleration_m_s2: Floats) -> Floats:
+    """Return the force that accelerates the spacecraft, in newtons."""
+    assert craft.mass_kg is not None
+    return craft.mass_kg * acceleration_m_s2
+
+
 class Propellant(InUnits):
     """Propellant in kg for the ΔV of thrusters along the axes, m (1 - exp(-ΔV/(g₀ I_sp))).
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
-from importlib.metadata import version
+from importlib.metadata import entry_points, version
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ NOT_IN_IDENTITY = ("scheduler", "figures", "output_dir")
 VERSIONS = ("numpy", "scipy")
 """Packages whose versions change numbers."""
 
+_KINDS = ("plants", "controllers", "solvers", "measures", "surveys")
 _LENGTH = 12
 
 
@@ -33,6 +35,8 @@ def run_id(configuration: Mapping[str, Any], sources: str | None = None) -> str:
         "sources": sources_digest() if sources is None else sources,
         "versions": {name: version(name) for name in VERSIONS},
     }
+    if others := extensions(configuration):
+        what["extensions"] = others
     return hashlib.sha256(canonical_json(what).encode()).hexdigest()[:_LENGTH]
 
 
@@ -41,11 +45,47 @@ def canonical_json(data: Any) -> str:
     return json.dumps(data, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
 
 
+def extensions(configuration: Mapping[str, Any]) -> dict[str, str]:
+    """Return the digests of the installed packages, by name, from which a run has its plant, laws or measures."""
+    named = {*_types(configuration), *configuration.get("measures", {})}
+    packages = {module.partition(".")[0] for name, module in _entry_points() if name in named}
+    return {package: _package_digest(package) for package in sorted(packages)}
+
+
+def _types(data: Any) -> Iterator[str]:
+    """Yield what stands behind the keys `type`, at any depth."""
+    for key, value in data.items() if isinstance(data, Mapping) else ():
+        if key == "type":
+            yield str(value)
+        else:
+            yield from _types(value)
+
+
+@cache
+def _entry_points() -> tuple[tuple[str, str], ...]:
+    """Name and module of everything that other packages offer and that changes numbers."""
+    found = [entry_points(group=f"fracctl.{kind}") for kind in _KINDS]
+    return tuple((entry.name, entry.module) for group in found for entry in group)
+
+
+@cache
+def _package_digest(package: str) -> str:
+    spec = find_spec(package)
+    if spec is None or spec.origin is None:
+        return ""
+    origin = Path(spec.origin)
+    return sources_digest(origin.parent) if spec.submodule_search_locations else _digest([origin], origin.parent)
+
+
 @cache
 def sources_digest(package: Path = PACKAGE) -> str:
     """Return the SHA-256 over names and contents of a package's Python sources."""
+    return _digest(sorted(package.rglob("*.py")), package)
+
+
+def _digest(paths: Iterable[Path], package: Path) -> str:
     digest = hashlib.sha256()
-    for path in sorted(package.rglob("*.py")):
+    for path in paths:
         content = path.read_bytes()
         digest.update(f"{path.relative_to(package).as_posix()}\0{len(content)}\0".encode())
         digest.update(content)

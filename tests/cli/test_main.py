@@ -44,7 +44,7 @@ def test_without_a_command_the_help_goes_to_standard_error(capsys: pytest.Captur
     ("words", "said"),
     [
         (["rnu"], "there is no command 'rnu'; did you mean 'run'?"),
-        (["fly"], "there is no command 'fly'; commands: run, resume, reproduce, list, show, validate"),
+        (["fly"], "there is no command 'fly'; commands: init, run, resume, compare"),
         (["experiment=x"], "'experiment=x' is no command; did you mean 'fracctl run experiment=x'?"),
         (["--json"], "option '--json' belongs behind a command, as in 'fracctl run --json'"),
         (["--verison"], "unknown option '--verison'; did you mean '--version'?"),
@@ -55,11 +55,11 @@ def test_without_a_command_the_help_goes_to_standard_error(capsys: pytest.Captur
         (["run", "-x"], "unknown option '-x'"),
         (["run", "--cfg", "all"], "argument --cfg: invalid choice: 'all'"),
         (["run", "--config-dir"], "argument --config-dir: expected one argument"),
-        (["run", "foo"], "'foo' is not an override; write KEY=VALUE"),
+        (["run", "foo"], "'foo' is neither an override, KEY=VALUE, nor a study, for there is no foo.yaml"),
         (["list", "contoller"], "there is no group 'contoller'; did you mean 'controller'?"),
         (["list", "plant", "solver"], "'list' takes one group"),
         (["list", "runs", "here"], "'list runs' takes output_dir=DIR only"),
-        (["validate", "--json"], "unknown option '--json'"),
+        (["validate", "--fresh"], "unknown option '--fresh'"),
     ],
 )
 def test_wrong_command_lines(capsys: pytest.CaptureFixture[str], words: list[str], said: str) -> None:

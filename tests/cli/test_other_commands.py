@@ -39,7 +39,7 @@ def test_list_shows_files_of_ones_own(capsys: pytest.CaptureFixture[str], tmp_pa
     (tmp_path / "experiment" / "campaign").mkdir(parents=True)
     (tmp_path / "experiment" / "campaign" / "one.yaml").write_text("# fracctl run experiment=campaign/one\n# First.\n")
     found = lines(capsys, "list", "experiments", "--config-dir", str(tmp_path))
-    assert found[0].split() == ["campaign/one", "First."]
+    assert found[0].split() == ["campaign/one", "First"]
     assert lines(capsys, "validate", "experiment=campaign/one", "--config-dir", str(tmp_path))
 
 
@@ -59,10 +59,26 @@ def test_list_runs(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypat
     (tmp_path / "work" / "a" / "broken").mkdir()
     (tmp_path / "work" / "a" / "broken" / "run.json").write_text("{")
     found = [line.split() for line in lines(capsys, "list", "runs", "output_dir=work")]
-    assert found[1:] == [
-        ["2026-01-01", "stopped", "work/a/0123"],
-        ["2026-01-02", "finished", "settling_time", "3.01276", "work/b/0123"],
+    assert found[0] == ["age", "status", "result", "directory"]
+    assert [line[1] for line in found[1:]] == ["days", "days"]
+    assert [line[2:] for line in found[1:]] == [
+        ["stopped", "work/a/0123"],
+        ["finished", "settling_time", "3.01276", "work/b/0123"],
     ]
+    plain = [json.loads(line) for line in lines(capsys, "list", "runs", "output_dir=work", "--json")]
+    assert [run["value"] for run in plain] == [None, 3.0127612]
+    assert plain[0] == {
+        "directory": "work/a/0123",
+        "experiment": "a",
+        "run_id": "0123",
+        "status": "stopped",
+        "failed_points": 0,
+        "laws": [],
+        "started": "2026-01-01",
+        "objective": "settling_time",
+        "value": None,
+        "error": None,
+    }
 
 
 def test_show_speaks_in_units(capsys: pytest.CaptureFixture[str]) -> None:

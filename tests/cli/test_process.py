@@ -40,7 +40,13 @@ def test_python_m_fracctl(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("words", ["list", "run experiment=outofplane --cfg job", "show", "run --help"])
+@pytest.mark.parametrize(
+    "words",
+    [
+        *("list", "list experiments", "list --json", "run experiment=outofplane --cfg job", "show", "show --json"),
+        *("run --help", "validate", "completion bash", "completion --complete 'fracctl run '", "reproduce --help"),
+    ],
+)
 def test_a_reader_that_leaves_is_no_error(words: str) -> None:
     command = f"set -o pipefail; '{sys.executable}' -m fracctl {words} | head -1"
     environment = os.environ | {"PYTHONPATH": str(ROOT)}

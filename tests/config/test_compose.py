@@ -127,7 +127,7 @@ def test_what_hydra_would_take_silently_or_say_obscurely(words: list[str], said:
         ("survey.axes.alpha_w=range(0.9,1.0,0.01)", "an axis of a survey is written start:stop:step"),
         ("survey.axes.alpha_w=0.9,1.0", "a list is written 'survey.axes.alpha_w=[0.9,1.0]'"),
         ("ic1_outofplane", "did you mean 'experiment=ic1_outofplane'?"),
-        ("foo", "write KEY=VALUE"),
+        ("foo", "neither an override, KEY=VALUE"),
         ("=1", "write KEY=VALUE"),
         ("name='a", "cannot read"),
         ("controller.alpha_w=interval(0,1)", "has no list of values"),

@@ -38,7 +38,7 @@ def test_sweeps_become_jobs(words: list[str], jobs: list[list[str]]) -> None:
         ("a=range(0,1,0)", "cannot read"),
         ("a=range(0,1e9)", "more than 10000 runs"),
         ("a=interval(0,1)", "has no list of values"),
-        ("a", "write KEY=VALUE"),
+        ("a", "neither an override, KEY=VALUE"),
     ],
 )
 def test_sweeps_that_are_none(word: str, said: str) -> None:

@@ -11,7 +11,7 @@ import fracctl as fc
 from fracctl.config.build import build_evaluation
 from fracctl.config.compose import compose
 from fracctl.errors import ArgumentError, ConfigurationError
-from fracctl.measures.fuel import DeltaV, PeakThrust, Propellant, StationKeeping, magnitude_integral
+from fracctl.measures.fuel import DeltaV, PeakForce, PeakThrust, Propellant, StationKeeping, magnitude_integral
 from fracctl.measures.in_units import InUnits
 from fracctl.measures.open_loop_bound import OpenLoopBound
 from fracctl.measures.overshoot_m import OvershootM
@@ -141,3 +141,12 @@ def test_a_band_that_is_not_reached_is_told_of_but_decides_nothing() -> None:
     assert rows["status"].tolist() == ["ok"]
     aimed = build_evaluation(compose([*words, "objectives.settling_time=[settling_time_1_m]"]))(design)
     assert aimed["status"].tolist() == ["unsettled"]
+
+
+def test_the_peak_force_is_that_of_the_peak_acceleration() -> None:
+    trajectory = flown("pd_alpha", 6.0)
+    peak = PeakThrust().for_flight(PLANT)(trajectory)["peak_acceleration_mm_s2"]
+    found = PeakForce().for_flight(PLANT, Spacecraft(mass_kg=500.0))(trajectory)
+    np.testing.assert_allclose(found["peak_force_n"], 0.5 * peak, rtol=1e-14)
+    with pytest.raises(ArgumentError, match=r"spacecraft\.mass_kg"):
+        PeakForce().for_flight(PLANT)

@@ -1,4 +1,4 @@
-"""Figure types by name, and the call that draws a run's figures."""
+"""The call that draws a run's figures; their types are in the registry of names."""
 
 from __future__ import annotations
 
@@ -10,61 +10,12 @@ from typing import Any
 import pandas as pd
 from matplotlib.figure import Figure
 
-from fracctl.errors import ConfigurationError, FracctlError, suggestion
-from fracctl.figures import (
-    acceleration,
-    approach,
-    bode,
-    deployment,
-    drift,
-    feedback,
-    gain_contours,
-    multiplier_window,
-    nyquist,
-    objective_against_order,
-    orbits,
-    order_contours,
-    pareto_fronts,
-    poles,
-    position_error,
-    settling_against_band,
-    settling_against_effort,
-    settling_against_overshoot,
-    spread,
-    survival,
-    trajectories,
-    work_precision,
-)
+from fracctl.config import registry
+from fracctl.errors import ConfigurationError, FracctlError
 from fracctl.figures.results import FigureError, Results, Selection, select
 from fracctl.figures.style import render, style
 from fracctl.store import RunDirectory
 from fracctl.store.files import make_directory, write_bytes
-
-TYPES: Mapping[str, Callable[[Results, Selection], tuple[Figure, pd.DataFrame]]] = {
-    "gain_contours": gain_contours.build,
-    "trajectories": trajectories.build,
-    "objective_against_order": objective_against_order.build,
-    "order_contours": order_contours.build,
-    "pareto_fronts": pareto_fronts.build,
-    "poles": poles.build,
-    "bode": bode.build,
-    "nyquist": nyquist.build,
-    "work_precision": work_precision.build,
-    "settling_against_band": settling_against_band.build,
-    "settling_against_effort": settling_against_effort.build,
-    "orbits": orbits.build,
-    "feedback": feedback.build,
-    "drift": drift.build,
-    "multiplier_window": multiplier_window.build,
-    "deployment": deployment.build,
-    "settling_against_overshoot": settling_against_overshoot.build,
-    "spread": spread.build,
-    "survival": survival.build,
-    "approach": approach.build,
-    "position_error": position_error.build,
-    "acceleration": acceleration.build,
-}
-"""Type in the configuration to the function that makes the figure and the table behind it."""
 
 
 @dataclass(frozen=True)
@@ -105,11 +56,12 @@ def draw(run: RunDirectory, figures: Mapping[str, Mapping[str, Any]], remark: st
 def _request(results: Results, name: str, options: Mapping[str, Any]) -> _Request:
     others = {key: value for key, value in options.items() if key != "type"}
     kind = str(options.get("type"))
-    if kind not in TYPES:
-        known = f"must be one of {', '.join(TYPES)}"
-        raise ConfigurationError(f"figures.{name}.type = {kind}: {known}{suggestion(kind, TYPES)}")
     try:
-        return _Request(name, TYPES[kind], select(results, others))
+        build = registry.load("figures", kind)
+    except ConfigurationError as problem:
+        raise ConfigurationError(f"figures.{name}.type = {kind}: {problem}") from None
+    try:
+        return _Request(name, build, select(results, others))
     except ConfigurationError as problem:
         raise ConfigurationError(f"figures.{name}: {problem}") from None
 

@@ -1,0 +1,1 @@
+"""Pitch of a satellite under the gravity gradient, for fracctl."""
