@@ -7,8 +7,8 @@ from pathlib import Path
 
 from fracctl.cli import output
 from fracctl.cli.parser import Parser
-from fracctl.cli.table import count
 from fracctl.errors import RunError
+from fracctl.report.numbers import count
 
 SUMMARY = "check a configuration, or the files of a stored run, without computing"
 
@@ -35,9 +35,9 @@ def execute(options: argparse.Namespace) -> int:
     words: list[str] = options.overrides
     if len(words) == 1 and "=" not in words[0] and Path(words[0]).is_dir():
         return _validate_run(Path(words[0]))
-    from fracctl.cli.words import extent
     from fracctl.config.build import build_checked
     from fracctl.config.compose import compose
+    from fracctl.report.words import extent
 
     config = compose(words, options.config_dir)
     evaluation, survey = build_checked(config)

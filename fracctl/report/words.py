@@ -8,12 +8,12 @@ from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from fracctl.cli.table import count, number, table
 from fracctl.comparison import ComparisonEvaluation as ComparisonEvaluated
 from fracctl.config import registry
 from fracctl.config.schemas import GridSurvey, RunConfig, SingleSurvey
 from fracctl.evaluation import Evaluation
 from fracctl.plants import Chief, LinearPlant
+from fracctl.report.numbers import count, number
 from fracctl.store.identity import run_id
 from fracctl.surveys import Survey, axis_values
 from fracctl.surveys.base import SEARCHED_FOR
@@ -23,9 +23,9 @@ _Row = tuple[str, str]
 _DRAWN = ("dispersions", "samples", "first_sample")
 
 
-def explain(config: RunConfig, evaluation: Evaluation, survey: Survey) -> list[str]:
-    """Return the lines that explain a run."""
-    rows = [
+def explain(config: RunConfig, evaluation: Evaluation, survey: Survey) -> list[_Row]:
+    """Return name and text of every part of a run; a part of several lines has its name on the first."""
+    return [
         *_plant(config, evaluation.plant),
         *_spacecraft(config),
         *_law(config, evaluation),
@@ -41,7 +41,6 @@ def explain(config: RunConfig, evaluation: Evaluation, survey: Survey) -> list[s
         ("figures", ", ".join(config.figures) or "none"),
         ("stored in", str(_directory(config))),
     ]
-    return [config.name, *table([[name, text] for name, text in rows])]
 
 
 def _evaluated(config: RunConfig) -> str:
