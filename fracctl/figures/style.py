@@ -79,8 +79,6 @@ _METADATA: Mapping[str, dict[str, None]] = {
     "svg": {"Date": None, "Creator": None, "Format": None, "Type": None},
 }
 
-_OPTIONS: Mapping[str, dict[str, int]] = {"svg": {"dpi": _IMAGE_DPI}}
-
 
 @contextmanager
 def style() -> Iterator[None]:
@@ -102,7 +100,7 @@ def render(figure: Figure, kinds: Sequence[str] = FILES) -> dict[str, bytes]:
         _rasterise(figure)
     for kind in kinds:
         buffer = io.BytesIO()
-        figure.savefig(buffer, format=kind, metadata=_METADATA[kind], **_OPTIONS.get(kind, {}))
+        figure.savefig(buffer, format=kind, dpi=_IMAGE_DPI if kind == "svg" else "figure", metadata=_METADATA[kind])
         files[kind] = buffer.getvalue()
     return files
 
@@ -113,6 +111,6 @@ def _rasterise(figure: Figure) -> None:
         if marked and np.size(line.get_xdata()) > _MOST_POINTS:
             line.set_rasterized(True)
     for collection in figure.findobj(Collection):
-        vertices = sum(len(path.vertices) for path in collection.get_paths())
-        if max(vertices, len(collection.get_offsets())) > _MOST_POINTS:
+        vertices = sum(np.shape(path.vertices)[0] for path in collection.get_paths())
+        if max(vertices, np.shape(collection.get_offsets())[0]) > _MOST_POINTS:
             collection.set_rasterized(True)
