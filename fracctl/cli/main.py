@@ -6,7 +6,7 @@ import sys
 from collections.abc import Sequence
 from types import ModuleType
 
-from fracctl.cli import export, listing, output, reproduce, run, show, validate
+from fracctl.cli import export, listing, output, reporting, reproduce, run, show, validate
 from fracctl.cli.failure import report
 from fracctl.errors import UsageError, suggestion
 
@@ -14,6 +14,7 @@ INTERRUPTED = 130
 COMMANDS: dict[str, ModuleType] = {
     "run": run,
     "reproduce": reproduce,
+    "report": reporting,
     "list": listing,
     "show": show,
     "validate": validate,

@@ -12,6 +12,8 @@ _REFERENCE = re.compile(r"url\(#([^)]+)\)")
 _LONG = re.compile(r"-?\d+\.\d{3,}")
 _PLACES = ("d", "x", "y", "width", "height")
 """Attributes whose numbers are places in points; a hundredth is finer than any screen."""
+_LEAST, _MOST = 1.1, 1.65
+"""Pixels that a point of a picture may take: what is wider than the page scrolls within itself."""
 _STYLE = {"stroke-linejoin": "round", "stroke-linecap": "butt"}
 """What the style sheet of the file says of all its elements; in a page it would speak of all of the page."""
 
@@ -32,7 +34,10 @@ def inline(svg: bytes, prefix: str) -> str:
     for element in root.iter():
         _tidy(element, used, prefix)
     root.attrib.pop("version", None)
-    root.attrib |= _STYLE | {"aria-hidden": "true", "focusable": "false"}
+    width = float(root.attrib.pop("width").removesuffix("pt"))
+    del root.attrib["height"]
+    size = {"style": f"min-width:{_LEAST * width:.0f}px;max-width:{_MOST * width:.0f}px"}
+    root.attrib |= _STYLE | size | {"aria-hidden": "true", "focusable": "false"}
     return ElementTree.tostring(root, encoding="unicode")
 
 

@@ -14,7 +14,7 @@ from fracctl.arrays import Array
 from fracctl.errors import RunError
 from fracctl.store import manifest, tables
 from fracctl.store.columns import records_table, to_rows, to_table
-from fracctl.store.files import make_directory, move, remove_tree, write_bytes
+from fracctl.store.files import disk_errors, make_directory, move, remove_tree, write_bytes
 
 
 class RunDirectory:
@@ -34,6 +34,7 @@ class RunDirectory:
         self.figures = self.path / "figures"
         self.parts = self.path / manifest.PARTS
         self.log = self.path / "run.log"
+        self.report = self.path / manifest.REPORT
 
     def __repr__(self) -> str:
         return f"RunDirectory({str(self.path)!r})"
@@ -132,7 +133,9 @@ class RunDirectory:
         write_bytes(self.path / f"{name}.csv", text.encode())
 
     def write_manifest(self) -> None:
-        """Write the digests of all files; from now on the run is finished."""
+        """Write the digests of all files; from now on the run is finished, and a report of what it was before gone."""
+        with disk_errors(self.report):
+            self.report.unlink(missing_ok=True)
         manifest.write(self.path)
 
     def remove_manifest(self) -> None:
