@@ -87,7 +87,7 @@ def results(runs: Sequence[LabelledRun]) -> list[Table]:
 
 def _side_by_side(objective: str, condition: str, entries: Sequence[tuple[LabelledRun, Mapping[str, Any]]]) -> Table:
     column, first = f"objective_{objective}", entries[0]
-    change = f"against {first[0].short}, %"
+    change = f"change against {first[0].short}, %"
     points = []
     for entry, optimum in entries:
         point = shown_point(entry.run, objective, optimum["optimum"])

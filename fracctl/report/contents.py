@@ -16,7 +16,7 @@ import yaml
 from fracctl.config.build import build_checked
 from fracctl.config.compose import to_yaml
 from fracctl.config.repeat import overrides_for
-from fracctl.errors import FracctlError
+from fracctl.errors import FracctlError, RunError
 from fracctl.figures import drawing
 from fracctl.report.numbers import count
 from fracctl.report.pictures import inline
@@ -73,14 +73,15 @@ def in_words(run: StoredRun) -> list[tuple[str, str]]:
     return shown
 
 
-def tables(run: StoredRun) -> list[Table]:
-    """Return the tables of what the run stored."""
-    found = [*_results(run), *_concluded(run)]
-    if run.directory.optima_path.exists():
-        found += _slices(run)
-    if run.directory.evaluations_path.exists():
-        found.append(_evaluated(run))
-    return found
+def tables(run: StoredRun) -> tuple[list[Table], list[str]]:
+    """Return the tables of what the run stored, and a sentence for each file that cannot be read."""
+    found, problems = [*_results(run), *_concluded(run)], []
+    for path, read in ((run.directory.optima_path, _slices), (run.directory.evaluations_path, _evaluated)):
+        try:
+            found += read(run) if path.exists() else ()
+        except RunError as problem:
+            problems.append(str(problem))
+    return found, problems
 
 
 def _results(run: StoredRun) -> Iterator[Table]:
@@ -137,7 +138,7 @@ def _slices(run: StoredRun) -> Iterator[Table]:
         yield of_frame(f"The best point of each slice, by {name}", own.drop(columns=unwanted), "optima.parquet")
 
 
-def _evaluated(run: StoredRun) -> Table:
+def _evaluated(run: StoredRun) -> Iterator[Table]:
     """The evaluated points, the best ones first where there is an objective."""
     rows = run.directory.evaluations()
     words = ", ".join(f"{number} {word}" for word, number in Counter(rows["status"]).most_common())
@@ -145,8 +146,8 @@ def _evaluated(run: StoredRun) -> Table:
     ranked = column in rows
     if ranked:
         rows = _ranked(rows, column)
-    cut_to = f"the best, by {run.configuration['objective']}," if ranked else "the first"
-    return of_frame(f"Evaluated points: {count(len(rows), 'row')}, {words}", rows, "evaluations.parquet", cut_to)
+    best_by = run.configuration["objective"] if ranked else ""
+    yield of_frame(f"Evaluated points: {count(len(rows), 'row')}, {words}", rows, "evaluations.parquet", best_by)
 
 
 def _ranked(rows: pd.DataFrame, column: str) -> pd.DataFrame:

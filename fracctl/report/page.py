@@ -27,7 +27,9 @@ def run_page(run: StoredRun, config_dir: Path | None = None) -> str:
         config_dir: a directory of YAML files that the command may name options of.
     """
     pictures, undrawn = contents.pictures(run, "f")
-    alerts = [*run.alerts, *(problem for problem in undrawn if problem not in run.alerts)]
+    tables, unread = contents.tables(run)
+    published_tables, unjudged = published.of_run(run)
+    alerts = list(dict.fromkeys([*run.alerts, *unread, *unjudged, *undrawn]))
     return _render(
         "run.html",
         title=run.name,
@@ -37,8 +39,8 @@ def run_page(run: StoredRun, config_dir: Path | None = None) -> str:
         result=result(run),
         words=contents.in_words(run),
         pictures=pictures,
-        tables=contents.tables(run),
-        published=published.of_run(run),
+        tables=tables,
+        published=published_tables,
         configuration=contents.configuration_text(run),
         provenance=contents.provenance_rows(run),
         command=contents.command(run, config_dir),

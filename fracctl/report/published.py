@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
-from fracctl.errors import FracctlError
+from fracctl.errors import FracctlError, RunError
 from fracctl.report.contents import Picture, pictures
 from fracctl.report.stored import StoredRun
 from fracctl.report.tables import Cell, Column, Table, cell
@@ -22,11 +22,14 @@ _NUMBERS = ("published", "computed", "exact", "difference")
 _ONE_RUN = tuple(heading for heading in _HEADINGS if heading != "exact")
 
 
-def of_run(run: StoredRun) -> list[Table]:
-    """Return the numbers that papers print of a run's experiment, beside those of its optima."""
+def of_run(run: StoredRun) -> tuple[list[Table], list[str]]:
+    """Return the numbers that papers print of a run's experiment beside those of its optima, and what is in the way."""
     if not run.directory.optima_path.exists():
-        return []
-    return [table for suite in _suites() for name in suite.sections for table in _of_section(run, suite, name)]
+        return [], []
+    try:
+        return [table for suite in _suites() for name in suite.sections for table in _of_section(run, suite, name)], []
+    except RunError as problem:
+        return [], [str(problem)]
 
 
 def _suites() -> Iterator[Suite]:
@@ -77,7 +80,7 @@ def _cell(text: str, heading: str) -> Cell:
         try:
             return Cell(text, float(text.lstrip("<> ")))
         except ValueError:
-            return Cell(text or "–")
+            return Cell(text.strip("-") or "–")
     return cell(text)
 
 

@@ -128,12 +128,16 @@ def _comparison(records: Sequence[Record]) -> Iterator[str]:
         if record["verdict"] in _VERDICTS:
             verdicts.setdefault(str(record["law"]), Counter())[str(record["verdict"])] += 1
     words = [
-        f"{law} is " + ", ".join(f"{found[word]} times {word}" for word in _VERDICTS if found[word])
+        f"{law} is " + ", ".join(f"{_times(found[word])} {word}" for word in _VERDICTS if found[word])
         for law, found in verdicts.items()
     ]
     bands = ", ".join(f"{band:g} m" for band in dict.fromkeys(record["threshold_m"] for record in records))
     said = "; ".join(words) or "no verdict"
     yield f"Against {reference}, over all starts and limits and the bands of {bands}: {said}."
+
+
+def _times(how_many: int) -> str:
+    return "once" if how_many == 1 else f"{how_many} times"
 
 
 def _by_start(records: Sequence[Record]) -> Iterator[tuple[str, list[Record]]]:

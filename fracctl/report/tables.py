@@ -73,14 +73,14 @@ def cell(value: Any, column: str = "") -> Cell:
     return Cell(number(int(value) if isinstance(value, numbers.Integral) else float(value), _DIGITS), float(value))
 
 
-def of_frame(caption: str, frame: pd.DataFrame, whole: str, cut_to: str = "the first") -> Table:
+def of_frame(caption: str, frame: pd.DataFrame, whole: str, best_by: str = "") -> Table:
     """Return a stored table, without columns that are empty, cut where it is long.
 
     Args:
         caption: what it shows.
         frame: rows in the order in which they are shown.
         whole: file that holds all of it.
-        cut_to: which rows are shown of a long one.
+        best_by: objective by which they are ordered; empty where they are in no order.
     """
     filled = frame.dropna(axis="columns", how="all")
     names = [str(name) for name in filled.columns]
@@ -88,14 +88,14 @@ def of_frame(caption: str, frame: pd.DataFrame, whole: str, cut_to: str = "the f
         [cell(value, name) for name, value in zip(names, row, strict=True)]
         for row in filled.head(MOST_ROWS).itertuples(index=False)
     ]
-    return _table(caption, names, rows, _cut(rows, len(frame), whole, cut_to))
+    return _table(caption, names, rows, _cut(rows, len(frame), whole, best_by))
 
 
 def of_records(caption: str, records: Sequence[Mapping[str, Any]], whole: str) -> Table:
     """Return rows given one by one as a table; of JSON, where times that do not come are none."""
     names = [name for name in records[0] if any(record.get(name) is not None for record in records)]
     rows = [[_json_cell(record.get(name), name) for name in names] for record in records[:MOST_ROWS]]
-    return _table(caption, names, rows, _cut(rows, len(records), whole, "the first"))
+    return _table(caption, names, rows, _cut(rows, len(records), whole))
 
 
 def _table(caption: str, names: Sequence[str], rows: Sequence[Sequence[Cell]], remark: str) -> Table:
@@ -104,21 +104,34 @@ def _table(caption: str, names: Sequence[str], rows: Sequence[Sequence[Cell]], r
     return Table(caption, columns, rows, remark)
 
 
-def _cut(rows: Sequence[Any], of: int, whole: str, cut_to: str) -> str:
-    return f"These are {cut_to} {len(rows)} of {count(of, 'row')}; all are in {whole}." if len(rows) < of else ""
+def _cut(rows: Sequence[Any], of: int, whole: str, best_by: str = "") -> str:
+    if len(rows) == of:
+        return ""
+    which = (
+        f"the best {len(rows)} of {count(of, 'row')} by {best_by}" if best_by else f"the first {len(rows)} of {of} rows"
+    )
+    return f"These are {which}; all are in {whole}."
 
 
 def upright(
     caption: str, names: Iterable[str], points: Sequence[tuple[str, Mapping[str, Any]]], remark: str = ""
 ) -> Table:
-    """Return a row for each quantity and a column for each point; rows without any value are left out."""
+    """Return a row for each quantity and a column for each point; rows without any value are left out.
+
+    Args:
+        caption: what it shows.
+        names: columns of stored tables, or ``what, unit``.
+        points: title and values by name.
+        remark: below the table.
+    """
     columns = [Column("quantity", is_name=False), Column("unit", is_name=False)]
     columns += [Column(title, is_name=False, right=True) for title, _ in points]
     rows = []
     for name in names:
         cells = [_json_cell(point.get(name), name) for _, point in points]
         if any(point.get(name) is not None for _, point in points):
-            rows.append([Cell(name), Cell(unit_of(name)), *cells])
+            what, _, given = name.partition(", ")
+            rows.append([Cell(what), Cell(given or unit_of(name)), *cells])
     return Table(caption, columns, rows, remark)
 
 
