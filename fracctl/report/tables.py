@@ -30,6 +30,19 @@ class Cell:
     mark: str = ""
     """Class of a verdict."""
 
+    @property
+    def sorted_by(self) -> str:
+        """The key as a script reads it, where it is not the text itself."""
+        if self.key is None:
+            return ""
+        if math.isinf(self.key):
+            return "Infinity" if self.key > 0.0 else "-Infinity"
+        try:
+            float(self.text)
+        except ValueError:
+            return repr(self.key)
+        return ""
+
 
 @dataclass(frozen=True)
 class Column:

@@ -19,6 +19,9 @@ class Page(HTMLParser):
     headings: list[str] = field(default_factory=list)
     tables: list[dict[str, list[list[str]] | str]] = field(default_factory=list)
     texts: dict[str, list[str]] = field(default_factory=dict)
+    """By class, or by name of the element without one."""
+    sections: dict[str, list[str]] = field(default_factory=dict)
+    """By the id of the heading."""
     pictures: list[str] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -70,7 +73,7 @@ class Page(HTMLParser):
             self.texts.setdefault(given.get("class", tag), []).append(data.strip())
         for tag, given in self._open:
             if tag == "section":
-                self.texts.setdefault(given.get("aria-labelledby", ""), []).append(data.strip())
+                self.sections.setdefault(given["aria-labelledby"], []).append(data.strip())
 
     @property
     def result(self) -> str:
@@ -78,7 +81,7 @@ class Page(HTMLParser):
 
     @property
     def alerts(self) -> str:
-        return " ".join(self.texts.get("alerts", []))
+        return " ".join(self.sections.get("alerts", []))
 
     @property
     def commands(self) -> list[list[str]]:

@@ -98,8 +98,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def grid(folder: Path) -> RunResult:
-    return execute(compose([*KINDS["grid"][0], f"output_dir={folder}"]))
+def grid(tmp_path_factory: pytest.TempPathFactory) -> RunResult:
+    folder = tmp_path_factory.mktemp("grid")
+    return execute(compose([*KINDS["grid"][0], "figures=gain_contours", f"output_dir={folder}"]))
 
 
 @pytest.fixture
@@ -128,10 +129,10 @@ def test_a_report_of_each_kind_of_run(kind: str, folder: Path) -> None:
     assert run_id(compose(command[2:]).model_dump(mode="json")) == result.run_directory.name
     assert len(page.pictures) == page.source.count("<svg") == len(config.figures)
     assert any(str(table["caption"]).startswith("Evaluated points") for table in page.tables)
-    assert all(note in page.texts["notes"] + page.texts.get("alerts", []) for note in result.summary["notes"])
-    assert {config.plant.type, config.solver.type} <= {re.split(r"[:,]", text)[0] for text in page.texts["what"]}
-    assert f"name: {config.name}" in " ".join(page.texts["configuration"])
-    assert result.run_directory.name in page.texts["provenance"]
+    assert all(note in page.sections["notes"] + page.sections.get("alerts", []) for note in result.summary["notes"])
+    assert {config.plant.type, config.solver.type} <= {re.split(r"[:,]", text)[0] for text in page.sections["what"]}
+    assert f"name: {config.name}" in " ".join(page.sections["configuration"])
+    assert result.run_directory.name in page.sections["provenance"]
 
 
 def test_the_numbers_are_those_of_the_tables(grid: RunResult) -> None:
@@ -168,7 +169,7 @@ def test_columns_have_their_units(folder: Path) -> None:
 
 
 def test_published_numbers_stand_beside_those_of_the_run(folder: Path) -> None:
-    result = execute(compose(["experiment=outofplane", *GRID, f"output_dir={folder}"]))
+    result = execute(compose(["experiment=outofplane", *GRID, "figures=null", f"output_dir={folder}"]))
     page = page_of(result.run_directory)
     check_form(page)
     head, *rows = page.table("D. Yaylali, E. Butcher, A. Sinclair")
@@ -218,7 +219,7 @@ def test_an_error_and_missing_results_are_told_first(stored: Path, grid: RunResu
     for text in ("is not finished: some of its points", "2 points could not be computed (why)", notes[0]):
         assert text in page.alerts
     assert notes[1] not in page.alerts
-    assert page.texts["notes"][-1] == notes[1]
+    assert page.sections["notes"][-1] == notes[1]
 
 
 def test_damage_is_told_and_the_rest_shown(stored: Path) -> None:
@@ -233,12 +234,12 @@ def test_damage_is_told_and_the_rest_shown(stored: Path) -> None:
 
 
 def test_a_run_of_another_version_says_that_its_id_will_differ(stored: Path, grid: RunResult) -> None:
-    assert f"It gives the run id {grid.run_directory.name}" in " ".join(page_of(stored).texts["again"])
+    assert f"It gives the run id {grid.run_directory.name}" in " ".join(page_of(stored).sections["again"])
     other = stored.rename(stored.with_name("0123456789ab"))
     content = json.loads((other / "run.json").read_text(encoding="utf-8"))
     content["summary"]["run_id"], content["provenance"]["sources"] = other.name, "0" * 64
     change(other, **content)
-    assert "this run is of another version of fracctl" in " ".join(page_of(other).texts["again"])
+    assert "this run is of another version of fracctl" in " ".join(page_of(other).sections["again"])
 
 
 def test_a_configuration_that_does_not_fit_any_more_is_shown_all_the_same(stored: Path) -> None:
@@ -246,8 +247,8 @@ def test_a_configuration_that_does_not_fit_any_more_is_shown_all_the_same(stored
     change(stored, configuration=configuration)
     page = page_of(stored)
     assert page.commands == []
-    assert "does not read it any more" in " ".join(page.texts["again"])
-    assert "since: long" in " ".join(page.texts["configuration"])
+    assert "does not read it any more" in " ".join(page.sections["again"])
+    assert "since: long" in " ".join(page.sections["configuration"])
     assert "orbits" in page.result
 
 
@@ -256,18 +257,28 @@ def test_text_of_a_run_is_text_on_the_page(stored: Path, grid: RunResult) -> Non
     change(stored, summary=grid.summary | {"notes": [note]})
     page = page_of(stored)
     check_form(page)
-    assert note in page.texts["notes"]
+    assert note in page.sections["notes"]
     assert "<script>alert" not in page.source
 
 
 def test_runs_side_by_side(grid: RunResult, folder: Path) -> None:
-    slower = execute(compose(["experiment=ic1_outofplane", *GRID, "survey.axes.k_d_w=[1.5]", f"output_dir={folder}"]))
+    slower = execute(
+        compose(
+            [
+                "experiment=ic1_outofplane",
+                *GRID,
+                "survey.axes.k_d_w=[1.5,1.6]",
+                "figures=gain_contours",
+                f"output_dir={folder}",
+            ]
+        )
+    )
     runs = [StoredRun.read(result.run_directory) for result in (grid, slower)]
     page = Page(comparison_page(runs))
     check_form(page)
     assert [row[0] for row in page.table("The runs")] == ["run", "A: ic1_outofplane", "B: ic1_outofplane"]
     _, *differing = page.table("Where the configurations differ")
-    assert differing == [["survey.axes.k_d_w", "0:2:0.05", "[1.5]"]]
+    assert differing == [["survey.axes.k_d_w", "0:2:0.05", "[1.5, 1.6]"]]
     rows = {row[0]: row[1:] for row in page.table("Optimum of settling_time from ic1")}
     one, other = (run.results[0]["optimum"]["settling_time"] for run in runs)
     assert float(rows["change against A"][2]) == pytest.approx(100.0 * (other / one - 1.0), rel=1e-5)
@@ -288,4 +299,4 @@ def test_runs_of_different_experiments_are_compared_in_what_they_share(grid: Run
     check_form(page)
     assert page.table("Optimum of settling_time from ic1")[0] == ["quantity", "unit", "A: ic1_outofplane", "B: custom"]
     apart = Page(comparison_page(runs[1:]))
-    assert "No two of these runs have a result for the same objective" in " ".join(apart.texts["shared"])
+    assert "No two of these runs have a result for the same objective" in " ".join(apart.sections["shared"])

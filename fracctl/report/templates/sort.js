@@ -2,8 +2,8 @@
 for (const table of document.querySelectorAll("table.sortable")) {
   const headings = [...table.tHead.rows[0].cells];
   const key = (row, place) => {
-    const cell = row.cells[place];
-    return "key" in cell.dataset ? pythonNumber(cell.dataset.key) : cell.textContent.trim();
+    const text = row.cells[place].dataset.key ?? row.cells[place].textContent.trim();
+    return text === "" || Number.isNaN(Number(text)) ? text : Number(text);
   };
   headings.forEach((heading, place) => {
     const button = document.createElement("button");
@@ -19,9 +19,6 @@ for (const table of document.querySelectorAll("table.sortable")) {
       table.tBodies[0].append(...rows);
     });
   });
-}
-function pythonNumber(text) {
-  return text === "inf" ? Infinity : text === "-inf" ? -Infinity : Number(text);
 }
 function compare(one, other) {
   if (typeof one === "number" && typeof other === "number") return one < other ? -1 : one > other ? 1 : 0;
