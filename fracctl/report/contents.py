@@ -197,7 +197,8 @@ def _identity(run: StoredRun) -> str:
     """Whether the command gives the same run id here, or why it does not."""
     assert run.config is not None
     if run_id(run.config.model_dump(mode="json")) == run.run_id:
-        return f"It gives the run id {run.run_id}; where that run is stored, --fresh computes it again."
+        stored = "--fresh computes it again" if run.status == "finished" else "it goes on from there"
+        return f"It gives the run id {run.run_id}; where that run is stored, {stored}."
     other = run.provenance.get("sources") != sources_digest()
     why = "of fracctl" if other else "of NumPy or SciPy"
     return (

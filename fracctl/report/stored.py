@@ -21,10 +21,10 @@ from fracctl.store.columns import DIMENSIONLESS, unit
 _MISSING = ("no optimum", "no baseline", "failed", "damaged", "disagree", "could not", "figure '")
 """What notes say on results that are missing or not to be trusted."""
 _ENDINGS = {
-    "running": "it is being computed, or was killed; the command below continues it",
-    "interrupted": "it was interrupted; the command below continues it",
+    "running": "it is being computed, or was killed",
+    "interrupted": "it was interrupted",
     "failed": "it failed",
-    "incomplete": "some of its points could not be computed; the command below tries them again",
+    "incomplete": "some of its points could not be computed",
 }
 
 

@@ -208,6 +208,9 @@ def test_an_unfinished_run_says_so_first(stored: Path) -> None:
     assert "This run is not finished: it was interrupted" in page.alerts
     assert page.result == "There is no result yet."
     assert page.commands[0][:3] == ["fracctl", "run", "experiment=ic1_outofplane"]
+    assert f"It gives the run id {stored.name}; where that run is stored, it goes on" in " ".join(
+        page.sections["again"]
+    )
     assert page.tables == []
 
 
@@ -300,3 +303,48 @@ def test_runs_of_different_experiments_are_compared_in_what_they_share(grid: Run
     assert page.table("Optimum of settling_time from ic1")[0] == ["quantity", "unit", "A: ic1_outofplane", "B: custom"]
     apart = Page(comparison_page(runs[1:]))
     assert "No two of these runs have a result for the same objective" in " ".join(apart.sections["shared"])
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ([], "needs the directory of a run"),
+        (["nowhere"], "'nowhere' does not exist"),
+        (["empty"], "'empty' holds no run: it has no run.json"),
+        (["outputs"], "'outputs' holds no run: it has no run.json; did you mean 'outputs/one/0123'?"),
+        (["file"], "'file' is a file"),
+        (["outputs/one/0123"], "run.json has no configuration"),
+        (["empty", "empty"], "'empty' is named twice"),
+        (["experiment=tether"], "takes directories of runs, not the override"),
+        (["outputs/one/0123", "--to", "empty"], "--to empty is a directory; name a file in it, as empty/report.html"),
+        (["--config", "x"], "unknown option '--config'; did you mean '--config-dir'?"),
+    ],
+)
+def test_what_is_no_run_gets_a_sentence(
+    words: list[str], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for folder in ("empty", "outputs/one/0123"):
+        Path(folder).mkdir(parents=True)
+    Path("file").touch()
+    Path("outputs/one/0123/run.json").write_text("{}", encoding="utf-8")
+    assert main(["report", *words]) in (1, 2)
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert len(captured.err.splitlines()) == 1
+    assert said in captured.err
+
+
+def test_where_the_page_goes(
+    stored: Path, grid: RunResult, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["report", str(stored), "--to", "pages/own.html", "--json"]) == 0
+    line = json.loads(capsys.readouterr().out)
+    assert line == {"report": str(tmp_path / "pages" / "own.html"), "runs": [str(stored)]}
+    assert not (stored / "report.html").exists()
+    assert main(["report", str(stored), str(grid.run_directory)]) == 0
+    assert capsys.readouterr().out == "comparison.html\n"
+    assert Page(Path("comparison.html").read_text(encoding="utf-8")).table("The runs")
+    assert main(["report", str(stored), "--to", f"{stored}/run.json/page.html"]) == 1
+    assert "--to FILE writes it elsewhere" in capsys.readouterr().err
