@@ -44,12 +44,13 @@ BOTTOM_UP = (
     "store",
     "config",
     "figures",
-    "report",
     "execution",
     "reproduction",
+    "report",
     "cli",
 )
-"""Figures and the report read the store only; a run in `execution` draws them at its end."""
+"""Figures and the report read the store only; a run in `execution` draws figures at its end, a report of a paper's run
+has the published numbers of `reproduction`."""
 
 LONGEST_MODULE = 350
 HYDRA_MODULE = "config/compose.py"

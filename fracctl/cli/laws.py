@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from fracctl.cli.table import TURN, number, table
+from fracctl.cli.table import TURN, table
+from fracctl.report.numbers import number
 
 Record = Mapping[str, Any]
 

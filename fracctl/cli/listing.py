@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 from fracctl.cli import output
 from fracctl.cli.parser import Parser
-from fracctl.cli.table import count, number, table
+from fracctl.cli.table import table
 from fracctl.errors import UsageError, suggestion
+from fracctl.report.numbers import count, number
 
 if TYPE_CHECKING:
     from fracctl.config.catalogue import Catalogue

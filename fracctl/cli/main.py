@@ -6,7 +6,20 @@ import sys
 from collections.abc import Sequence
 from types import ModuleType
 
-from fracctl.cli import compare, completion, export, init, listing, output, reproduce, resume, run, show, validate
+from fracctl.cli import (
+    compare,
+    completion,
+    export,
+    init,
+    listing,
+    output,
+    reporting,
+    reproduce,
+    resume,
+    run,
+    show,
+    validate,
+)
 from fracctl.cli.failure import report
 from fracctl.errors import UsageError, suggestion
 
@@ -17,6 +30,7 @@ COMMANDS: dict[str, ModuleType] = {
     "resume": resume,
     "compare": compare,
     "reproduce": reproduce,
+    "report": reporting,
     "list": listing,
     "show": show,
     "validate": validate,

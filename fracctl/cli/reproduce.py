@@ -32,6 +32,7 @@ _EXAMPLES = """\
   fracctl reproduce                              all papers
   fracctl reproduce fractional_hcw               all sections of one
   fracctl reproduce fractional_hcw/out_of_plane  one section
+  fracctl reproduce --report fractional_hcw      and an HTML page with figures, the last line
   fracctl reproduce --json                       a line of JSON for each section, with all rows"""
 
 
@@ -39,6 +40,7 @@ def parser() -> Parser:
     """Return the command's parser."""
     parser = Parser("reproduce", "[PAPER | PAPER/SECTION …]", _DESCRIPTION, _EXAMPLES)
     parser.add_argument("names", nargs="*", metavar="PAPER[/SECTION]", help="a folder of experiments/, or a part of it")
+    parser.add_argument("--report", action="store_true", help="an HTML page too for each paper, with figures")
     parser.add_json("one JSON object a line for each section")
     parser.add_argument("--quiet", action="store_true", help="no progress on standard error, no notes")
     return parser
@@ -49,8 +51,11 @@ def execute(options: argparse.Namespace) -> int:
     from fracctl.execution.executors import Executors
 
     chosen = select(options.names)
+    done: list[Reproduction] = []
     with Executors() as executors:
-        codes = [_section(suite, section, options, executors) for suite, section in chosen]
+        codes = [_section(suite, section, options, executors, done) for suite, section in chosen]
+    if options.report:
+        codes += [_report(suite, done, options) for suite in {suite.name: suite for suite, _ in chosen}.values()]
     return max(codes)
 
 
@@ -91,8 +96,30 @@ def _list(what: str, names: Iterable[str]) -> str:
     return f"; {what}: {', '.join(names)}"
 
 
-def _section(suite: Suite, section: str, options: argparse.Namespace, executors: Executors) -> int:
-    """Reproduce one section, show it, and return its exit code."""
+def _report(suite: Suite, done: Sequence[Reproduction], options: argparse.Namespace) -> int:
+    """Write the page on what was reproduced of a paper, and return its exit code."""
+    from fracctl.report.page import paper_page, write
+    from fracctl.report.published import PaperSection
+
+    results = [result for result in done if result.paper == suite.name]
+    if not results:
+        return 0
+    path = results[0].directory.parent / "report.html"
+    try:
+        write(path, paper_page(suite.name, suite.paper, [PaperSection(result) for result in results]))
+    except Exception as error:  # noqa: BLE001 - the other papers go on
+        return report(error, options.debug, f"{suite.name}: ")
+    if options.json:
+        output.say_json({"paper": suite.name, "report": str(path)})
+    else:
+        output.say(str(path))
+    return 0
+
+
+def _section(
+    suite: Suite, section: str, options: argparse.Namespace, executors: Executors, done: list[Reproduction]
+) -> int:
+    """Reproduce one section, show it, and return its exit code; `done` takes the result."""
     from fracctl.cli.progress import display
     from fracctl.reproduction.section import reproduce
     from fracctl.reproduction.table import write
@@ -106,6 +133,7 @@ def _section(suite: Suite, section: str, options: argparse.Namespace, executors:
             executors=executors,
         )
         write(result)
+        done.append(result)
     except Exception as error:  # noqa: BLE001 - the other sections go on
         if options.json:
             output.say_json({"paper": suite.name, "section": section, "error": sentence(error)})

@@ -30,15 +30,16 @@ def parser() -> Parser:
 
 def execute(options: argparse.Namespace) -> int:
     """Do what the command line asks for and return the exit code."""
-    from fracctl.cli.words import explain, parts
+    from fracctl.cli.table import table
     from fracctl.config.build import build_checked
     from fracctl.config.compose import compose
+    from fracctl.report.words import explain, parts
 
     config = compose(options.overrides, options.config_dir)
     evaluation, survey = build_checked(config)
     if options.json:
         output.say_json({"name": config.name, **parts(config, evaluation, survey)})
         return 0
-    for line in explain(config, evaluation, survey):
+    for line in [config.name, *table(explain(config, evaluation, survey))]:
         output.say(line)
     return 0

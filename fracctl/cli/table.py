@@ -9,6 +9,8 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from fracctl.report.numbers import number
+
 TURN = 2.0 * math.pi
 
 MOST_COLUMNS = 9
@@ -113,20 +115,6 @@ def _headings(columns: Sequence[str], name: str | None) -> list[str]:
 
 def _percent(result: Mapping[str, Any]) -> str:
     return f"{result['change_percent']:+.1f} %"
-
-
-def number(value: Any, digits: int = 6) -> str:
-    """A number for reading; anything else as text."""
-    if value is None:
-        return "-"
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        return str(value)
-    return f"{value:.{digits}g}"
-
-
-def count(how_many: int, what: str, plural: str = "s") -> str:
-    """``1 point``, ``2 points``, ``2 searches``."""
-    return f"{how_many} {what}" + ("" if how_many == 1 else plural)
 
 
 def title(name: str | None, factors: Sequence[str]) -> str:

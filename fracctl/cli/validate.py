@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from fracctl.cli import output
 from fracctl.cli.parser import Parser
-from fracctl.cli.table import count
 from fracctl.errors import ConfigurationError, RunError
+from fracctl.report.numbers import count
 
 if TYPE_CHECKING:
     from fracctl.store import RunDirectory
@@ -58,9 +58,9 @@ def execute(options: argparse.Namespace) -> int:
 
 def _configuration(words: list[str], config_dir: Path | None) -> tuple[dict[str, Any], str]:
     """Return what is found, as data and in words."""
-    from fracctl.cli.words import extent
     from fracctl.config.build import build_checked
     from fracctl.config.compose import compose
+    from fracctl.report.words import extent
 
     config = compose(words, config_dir)
     evaluation, survey = build_checked(config)

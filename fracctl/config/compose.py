@@ -56,6 +56,23 @@ def compose(overrides: Sequence[str], config_dir: Path | None = None) -> RunConf
         UsageError: a word is no override, or names several runs.
         ConfigurationError: the configuration is wrong; an InvalidConfiguration lists everything that is.
     """
+    data, origins = _composed(overrides, config_dir)
+    try:
+        return RunConfig.model_validate(data)
+    except ValidationError as error:
+        raise InvalidConfiguration(problems(error, origins)) from error
+
+
+def compose_plain(overrides: Sequence[str], config_dir: Path | None = None) -> dict[str, Any]:
+    """Return what the files and overrides say, not validated and without defaults.
+
+    Raises:
+        UsageError, ConfigurationError: as `compose`.
+    """
+    return _composed(overrides, config_dir)[0]
+
+
+def _composed(overrides: Sequence[str], config_dir: Path | None) -> tuple[dict[str, Any], Origins]:
     overrides, study = with_study(overrides)
     found = catalogue(config_dir, study)
     with _hydra(found) as loader:
@@ -65,10 +82,7 @@ def compose(overrides: Sequence[str], config_dir: Path | None = None) -> RunConf
         data, files = _load(words, loader, found)
     groups = {override.key: override.text for override in parsed if override.key in found.groups()}
     keys = [override.key for override in parsed if override.key not in groups]
-    try:
-        return RunConfig.model_validate(data)
-    except ValidationError as error:
-        raise InvalidConfiguration(problems(error, Origins(found, files, groups, keys))) from error
+    return data, Origins(found, files, groups, keys)
 
 
 def expand_multirun(overrides: Sequence[str], config_dir: Path | None = None) -> list[list[str]]:

@@ -12,8 +12,7 @@ from typing import Any
 import pyarrow as pa
 
 from fracctl.config.schemas import RunConfig
-from fracctl.execution.perform import directory_of
-from fracctl.store import tables
+from fracctl.store import directory_of, tables
 from fracctl.store.columns import DIMENSIONLESS, unit
 from fracctl.store.files import make_directory
 from fracctl.store.identity import canonical_json

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,9 +13,8 @@ from fracctl.execution.drawing import draw_figures
 from fracctl.execution.executors import Executors
 from fracctl.execution.progress import NoProgress, Progress
 from fracctl.execution.threads import single_threaded
-from fracctl.store import RunDirectory
+from fracctl.store import RunDirectory, directory_of
 from fracctl.store.files import make_directory, remove_tree
-from fracctl.store.identity import run_id
 from fracctl.store.lock import exclusive
 
 if TYPE_CHECKING:
@@ -85,11 +83,6 @@ def perform(
                 Computation(job, directory, progress or NoProgress(), notes, lenders).run()
             return RunResult(directory.path, directory.run_json["summary"])
         return _redrawn(directory, job)
-
-
-def directory_of(configuration: Mapping[str, Any]) -> RunDirectory:
-    """Return the run directory of a configuration, plain data."""
-    return RunDirectory(Path(configuration["output_dir"]) / configuration["name"] / run_id(configuration))
 
 
 def is_whole(directory: RunDirectory) -> bool:

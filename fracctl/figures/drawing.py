@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import sys
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,7 @@ from matplotlib.figure import Figure
 from fracctl.config import registry
 from fracctl.errors import ConfigurationError, FracctlError
 from fracctl.figures.results import FigureError, Results, Selection, select
-from fracctl.figures.style import render, style
+from fracctl.figures.style import FILES, render, style
 from fracctl.store import RunDirectory
 from fracctl.store.files import make_directory, write_bytes
 
@@ -23,6 +24,17 @@ class _Request:
     name: str
     build: Callable[[Results, Selection], tuple[Figure, pd.DataFrame]]
     selection: Selection
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """A figure for a page, and the table behind it."""
+
+    name: str
+    about: str
+    """What figures of its type show."""
+    svg: bytes
+    table: pd.DataFrame
 
 
 def draw(run: RunDirectory, figures: Mapping[str, Mapping[str, Any]], remark: str = "") -> list[Path]:
@@ -53,6 +65,19 @@ def draw(run: RunDirectory, figures: Mapping[str, Mapping[str, Any]], remark: st
     return written
 
 
+def drawing(run: RunDirectory, name: str, options: Mapping[str, Any]) -> Drawing:
+    """Draw one figure of a stored run for a page.
+
+    Raises:
+        ConfigurationError, FigureError: as `draw`.
+    """
+    results = Results(run)
+    request = _request(results, name, options)
+    contents, table = _drawn(request, results, ("svg",))
+    about = (sys.modules[request.build.__module__].__doc__ or "").partition("\n")[0]
+    return Drawing(name, about, contents["svg"], table)
+
+
 def _request(results: Results, name: str, options: Mapping[str, Any]) -> _Request:
     others = {key: value for key, value in options.items() if key != "type"}
     kind = str(options.get("type"))
@@ -67,9 +92,7 @@ def _request(results: Results, name: str, options: Mapping[str, Any]) -> _Reques
 
 
 def _files(folder: Path, request: _Request, results: Results, remark: str) -> list[Path]:
-    with style():
-        figure, table = request.build(results, request.selection)
-        contents = render(figure, remark)
+    contents, table = _drawn(request, results, FILES, remark)
     contents["csv"] = table.to_csv(index=False, lineterminator="\n").encode()
     make_directory(folder)
     paths = []
@@ -77,3 +100,11 @@ def _files(folder: Path, request: _Request, results: Results, remark: str) -> li
         paths.append(folder / f"{request.name}.{kind}")
         write_bytes(paths[-1], content)
     return paths
+
+
+def _drawn(
+    request: _Request, results: Results, kinds: Sequence[str], remark: str = ""
+) -> tuple[dict[str, bytes], pd.DataFrame]:
+    with style():
+        figure, table = request.build(results, request.selection)
+        return render(figure, kinds, remark), table

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
+import numpy as np
+from matplotlib.collections import Collection
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.transforms import Bbox
 
 if TYPE_CHECKING:
@@ -69,9 +72,15 @@ STYLE: dict[RcKeyType, Any] = {
 }
 """Everything that decides how a figure looks, over Matplotlib's own defaults; a user's settings play no part."""
 
+FILES = ("pdf", "png")
+"""Kinds of the files that a run keeps."""
+_MOST_POINTS = 3000
+"""What has more markers or vertices than this is an image within an SVG, which would grow by a hundred bytes each."""
+_IMAGE_DPI = 200
 _METADATA: Mapping[str, dict[str, None]] = {
     "pdf": {"CreationDate": None, "ModDate": None, "Creator": None, "Producer": None},
     "png": {"Software": None},
+    "svg": {"Date": None, "Creator": None, "Format": None, "Type": None},
 }
 
 
@@ -84,8 +93,8 @@ def style() -> Iterator[None]:
         yield
 
 
-def render(figure: Figure, remark: str = "") -> dict[str, bytes]:
-    """Return the figure as PDF and PNG files, without dates or versions in them; a remark stands below it."""
+def render(figure: Figure, kinds: Sequence[str] = FILES, remark: str = "") -> dict[str, bytes]:
+    """Return the figure as files of these kinds, without dates or versions in them; a remark stands below it."""
     engine = figure.get_layout_engine()
     if engine is not None:
         engine.execute(figure)
@@ -94,8 +103,23 @@ def render(figure: Figure, remark: str = "") -> dict[str, bytes]:
     figure.text(0.1 / width, -0.7 * _STRIP_IN / height, remark, color=ORANGE)
     with_strip = Bbox([[0.0, -_STRIP_IN], [width, height]])
     files = {}
-    for kind, metadata in _METADATA.items():
+    if "svg" in kinds:
+        _rasterise(figure)
+    for kind in kinds:
         buffer = io.BytesIO()
-        figure.savefig(buffer, format=kind, metadata=metadata, bbox_inches=with_strip if remark else None)
+        dpi = _IMAGE_DPI if kind == "svg" else "figure"
+        box = with_strip if remark else None
+        figure.savefig(buffer, format=kind, dpi=dpi, metadata=_METADATA[kind], bbox_inches=box)
         files[kind] = buffer.getvalue()
     return files
+
+
+def _rasterise(figure: Figure) -> None:
+    for line in figure.findobj(Line2D):
+        marked = line.get_marker() not in ("None", "", " ", None)
+        if marked and np.size(line.get_xdata()) > _MOST_POINTS:
+            line.set_rasterized(True)
+    for collection in figure.findobj(Collection):
+        vertices = sum(np.shape(path.vertices)[0] for path in collection.get_paths())
+        if max(vertices, np.shape(collection.get_offsets())[0]) > _MOST_POINTS:
+            collection.set_rasterized(True)

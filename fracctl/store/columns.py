@@ -66,8 +66,11 @@ def _field(name: str, counters: Collection[str]) -> pa.Field:
 
 
 def unit(name: str) -> str:
-    """Return the unit that a column's name ends with, ``1`` for a dimensionless one, as settling times to bands are."""
-    if name.startswith("settling_time_") and name.endswith("_m"):
+    """Return the unit that a column's name ends with, ``1`` for a dimensionless one.
+
+    Settling times to bands in metres are dimensionless, and so are the least tensions of a tether.
+    """
+    if (name.startswith("settling_time_") and name.endswith("_m")) or name.endswith("tension_min"):
         return DIMENSIONLESS
     return next((word for suffix, word in _UNITS.items() if name.endswith(suffix)), DIMENSIONLESS)
 

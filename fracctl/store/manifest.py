@@ -9,10 +9,12 @@ from fracctl.store.files import TEMPORARY, disk_errors, sha256, write_bytes
 
 NAME = "manifest.sha256"
 PARTS = "parts"
+REPORT = "report.html"
+"""Made of a run at any time, and no part of it."""
 
 
 def write(directory: Path) -> None:
-    """Write the manifest over all files but parts."""
+    """Write the manifest over all files but parts and the report."""
     with disk_errors(directory):
         lines = [f"{sha256(path)}  {path.relative_to(directory).as_posix()}\n" for path in _files(directory)]
     write_bytes(directory / NAME, "".join(lines).encode())
@@ -42,5 +44,5 @@ def _problem(directory: Path, line: str) -> str | None:
 def _files(directory: Path) -> Iterator[Path]:
     for path in sorted(directory.rglob("*")):
         parts = path.relative_to(directory).parts
-        if path.is_file() and parts[0] not in (NAME, PARTS) and path.suffix != TEMPORARY:
+        if path.is_file() and parts[0] not in (NAME, PARTS, REPORT) and path.suffix != TEMPORARY:
             yield path

@@ -17,7 +17,8 @@ from fracctl.arrays import Array
 from fracctl.errors import RunError
 from fracctl.store import lock, manifest, tables
 from fracctl.store.columns import records_table, to_rows, to_table
-from fracctl.store.files import make_directory, move, remove_tree, write_bytes
+from fracctl.store.files import disk_errors, make_directory, move, remove_tree, write_bytes
+from fracctl.store.identity import run_id
 
 _ANEW = "the command that started it finds what is left of it"
 
@@ -39,6 +40,7 @@ class RunDirectory:
         self.figures = self.path / "figures"
         self.parts = self.path / manifest.PARTS
         self.log = self.path / "run.log"
+        self.report = self.path / manifest.REPORT
 
     def __repr__(self) -> str:
         return f"RunDirectory({str(self.path)!r})"
@@ -178,7 +180,9 @@ class RunDirectory:
         write_bytes(self.path / f"{name}.csv", text.encode())
 
     def write_manifest(self) -> None:
-        """Write the digests of all files; from now on the run is finished."""
+        """Write the digests of all files; from now on the run is finished, and a report of what it was before gone."""
+        with disk_errors(self.report):
+            self.report.unlink(missing_ok=True)
         manifest.write(self.path)
 
     def remove_manifest(self) -> None:
@@ -214,3 +218,8 @@ def _chosen(table: pa.Table, wanted: Mapping[str, Sequence[Any]]) -> pa.Table:
     for name, values in wanted.items():
         table = table.filter(pc.is_in(table.column(name), pa.array(values, table.schema.field(name).type)))
     return table
+
+
+def directory_of(configuration: Mapping[str, Any]) -> RunDirectory:
+    """Return the run directory of a configuration, plain data."""
+    return RunDirectory(Path(configuration["output_dir"]) / configuration["name"] / run_id(configuration))

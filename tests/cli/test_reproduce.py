@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import shutil
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,8 @@ from fracctl.cli.main import main
 from fracctl.config.compose import compose
 from fracctl.errors import RunError
 from fracctl.reproduction.suites import suites_directory
+from tests.report.reading import Page
+from tests.report.test_report import check_form
 from tests.reproduction.test_section import SMALL_GRID
 
 NAME = "fractional_hcw/out_of_plane"
@@ -186,3 +189,38 @@ def test_help(capsys: pytest.CaptureFixture[str]) -> None:
     assert "fracctl reproduce fractional_hcw" in capsys.readouterr().out
     assert main(["--help"]) == 0
     assert "reproduce" in capsys.readouterr().out
+
+
+def test_a_report_of_a_paper_has_verdicts_reasons_and_figures(
+    monkeypatch: pytest.MonkeyPatch, small: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    drawn = [word for word in SMALL_GRID if not word.startswith("figures")]
+    monkeypatch.setattr(
+        "fracctl.reproduction.section.compose", lambda words: compose([*words, *drawn, f"output_dir={small}"])
+    )
+    assert main(["reproduce", "--report", NAME]) == 0
+    path = Path(capsys.readouterr().out.splitlines()[-1])
+    assert path == small / "reproduce" / "fractional_hcw" / "report.html"
+    page = Page(path.read_text(encoding="utf-8"))
+    check_form(page)
+    (table,) = page.tables
+    head, *rows = page.table(str(table["caption"]))
+    assert head == ["quantity", "place", "published", "unit", "computed", "exact", "difference", "verdict", "reason"]
+    counts = Counter(row[head.index("verdict")] for row in rows)
+    words = ("reproduced", "not reproduced", "not decidable")
+    counted = ", ".join(f"{counts[word]} {word}" for word in words)
+    assert page.result == f"{len(rows)} numbers and claims: {counted}."
+    assert all(row[-1] for row in rows if row[head.index("verdict")] != "reproduced"), "every other has its reason"
+    assert [label.partition(":")[0] for label in page.pictures] == ["figure_2", "figure_3", "figure_4", "figure_5"]
+    assert page.commands == [["fracctl", "reproduce", "--report", NAME]]
+
+
+def test_a_report_tells_first_what_does_not_come_out(
+    own_suites: Path, small: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    change(own_suites, "T_orb,0.63,0.01,reproduced", "T_orb,0.93,0.01,reproduced")
+    assert main(["reproduce", "--report", "--json", NAME]) == 1
+    line = json.loads(capsys.readouterr().out.splitlines()[-1])
+    assert line["paper"] == "fractional_hcw"
+    page = Page(Path(line["report"]).read_text(encoding="utf-8"))
+    assert "IC1: settling time of the fastest PD law does not come out as it must" in page.alerts

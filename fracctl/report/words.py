@@ -7,13 +7,13 @@ import math
 from collections.abc import Collection, Iterator, Mapping
 from typing import Any
 
-from fracctl.cli.table import count, number, table
 from fracctl.comparison import ComparisonEvaluation as ComparisonEvaluated
 from fracctl.config import registry
 from fracctl.config.schemas import GridSurvey, RunConfig, SingleSurvey
 from fracctl.evaluation import Evaluation
-from fracctl.execution.perform import directory_of
 from fracctl.plants import Chief, LinearPlant
+from fracctl.report.numbers import count, number
+from fracctl.store import directory_of
 from fracctl.surveys import Survey, axis_values
 from fracctl.surveys.base import SEARCHED_FOR
 from fracctl.units import Scales
@@ -22,21 +22,8 @@ _Row = tuple[str, str]
 _DRAWN = ("dispersions", "samples", "first_sample")
 
 
-def explain(config: RunConfig, evaluation: Evaluation, survey: Survey) -> list[str]:
-    """Return the lines that explain a run."""
-    return [config.name, *table([[name, text] for name, text in _rows(config, evaluation, survey)])]
-
-
-def parts(config: RunConfig, evaluation: Evaluation, survey: Survey) -> dict[str, Any]:
-    """Return the same as plain data: `run_directory`, `words` by what they explain, and the `configuration`."""
-    words: dict[str, list[str]] = {}
-    for name, text in _rows(config, evaluation, survey):
-        words.setdefault(name or next(reversed(words)), []).append(text)
-    plain = config.model_dump(mode="json")
-    return {"run_directory": str(directory_of(plain).path), "words": words, "configuration": plain}
-
-
-def _rows(config: RunConfig, evaluation: Evaluation, survey: Survey) -> list[_Row]:
+def explain(config: RunConfig, evaluation: Evaluation, survey: Survey) -> list[_Row]:
+    """Return name and text of every part of a run; a part of several lines has its name on the first."""
     return [
         *_plant(config, evaluation.plant),
         *_spacecraft(config),
@@ -53,6 +40,15 @@ def _rows(config: RunConfig, evaluation: Evaluation, survey: Survey) -> list[_Ro
         ("figures", ", ".join(config.figures) or "none"),
         ("stored in", str(directory_of(config.model_dump(mode="json")).path)),
     ]
+
+
+def parts(config: RunConfig, evaluation: Evaluation, survey: Survey) -> dict[str, Any]:
+    """Return the same as plain data: `run_directory`, `words` by what they explain, and the `configuration`."""
+    words: dict[str, list[str]] = {}
+    for name, text in explain(config, evaluation, survey):
+        words.setdefault(name or next(reversed(words)), []).append(text)
+    plain = config.model_dump(mode="json")
+    return {"run_directory": str(directory_of(plain).path), "words": words, "configuration": plain}
 
 
 def _evaluated(config: RunConfig) -> str:
