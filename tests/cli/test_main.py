@@ -44,7 +44,7 @@ def test_without_a_command_the_help_goes_to_standard_error(capsys: pytest.Captur
     ("words", "said"),
     [
         (["rnu"], "there is no command 'rnu'; did you mean 'run'?"),
-        (["fly"], "there is no command 'fly'; commands: run, reproduce, list, show, validate"),
+        (["fly"], "there is no command 'fly'; commands: run, reproduce, report, list, show, validate"),
         (["experiment=x"], "'experiment=x' is no command; did you mean 'fracctl run experiment=x'?"),
         (["--json"], "option '--json' belongs behind a command, as in 'fracctl run --json'"),
         (["--verison"], "unknown option '--verison'; did you mean '--version'?"),
