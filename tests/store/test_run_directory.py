@@ -9,6 +9,7 @@ import pytest
 
 from fracctl.errors import RunError
 from fracctl.store import RunDirectory
+from fracctl.store.columns import unit
 
 
 @pytest.fixture
@@ -72,3 +73,23 @@ def test_a_finished_run_is_set_aside_until_it_is_forgotten(run: RunDirectory) ->
     assert len(list(run.path.parent.iterdir())) == 1
     run.forget_aside()
     assert list(run.path.parent.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("column", "word"),
+    [("tension_min", "1"), ("demanded_tension_min", "1"), ("tension_min_n", "N"), ("settling_time_1_m_min", "min")],
+)
+def test_a_least_tension_is_not_in_minutes(column: str, word: str) -> None:
+    assert unit(column) == word
+
+
+def test_the_report_is_in_no_manifest_and_goes_with_the_run_it_was_made_of(tmp_path: Path) -> None:
+    directory = RunDirectory(tmp_path / "run")
+    directory.create()
+    directory.write_run_json({"status": "finished"})
+    directory.report.write_text("before", encoding="utf-8")
+    directory.write_manifest()
+    assert not directory.report.exists()
+    directory.report.write_text("after", encoding="utf-8")
+    assert directory.verify() == []
+    assert (directory.path / "manifest.sha256").read_text(encoding="utf-8").count("\n") == 1
