@@ -32,7 +32,8 @@ def test_the_paper_s_main_result_from_python(result: RunResult) -> None:
     assert optimum["settling_time"] == pytest.approx(3.01276, abs=5e-6)
     assert (baseline["alpha_w"], baseline["k_p_w"], baseline["k_d_w"]) == (1.0, 0.55, 2.0)
     assert baseline["settling_time"] == pytest.approx(3.96958, abs=5e-6)
-    tail, check = result.summary["notes"]
+    tail, *taught, check = result.summary["notes"]
+    assert any("k_d_w = 2 is the upper end of survey.axes.k_d_w" in note for note in taught)
     assert tail == "ic1, settling_time: settles to 100 m after 0.479 orbits, but to 10 m only after 2.15"
     assert check.startswith("cross-check:")
     assert len(result.evaluations) == 2 * 41 * 41
