@@ -4,8 +4,15 @@ from __future__ import annotations
 
 import importlib.metadata
 import re
+import sys
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
+
+HERE = Path(__file__).parent
+sys.path.insert(0, str(HERE))
+
+from reproduction_tables import write_pages  # noqa: E402 - it lies beside this file
 
 project = "fracctl"
 author = "The fracctl authors"
@@ -26,8 +33,13 @@ suppress_warnings = ["myst.xref_missing"]
 
 
 def setup(app: Any) -> None:
-    """Read docstrings as they are written: equations stand indented, |x| and k_p are plain text."""
+    """Make pages of what was reproduced; read docstrings as they are written: equations stand indented, |x| is plain."""
+    app.connect("builder-inited", _tables)
     app.connect("autodoc-process-docstring", _plain_text, priority=100)
+
+
+def _tables(_app: Any) -> None:
+    write_pages(HERE / "_generated")
 
 
 def _plain_text(*event: Any) -> None:
