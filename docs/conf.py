@@ -33,7 +33,7 @@ suppress_warnings = ["myst.xref_missing"]
 
 
 def setup(app: Any) -> None:
-    """Make pages of what was reproduced; read docstrings as they are written: equations stand indented, |x| is plain."""
+    """Write the pages of reproduction; read docstrings as written: equations stand indented, |x| and k_p are plain."""
     app.connect("builder-inited", _tables)
     app.connect("autodoc-process-docstring", _plain_text, priority=100)
 
