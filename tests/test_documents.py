@@ -50,6 +50,22 @@ def test_commands_of_the_documentation_are_valid(command: str, capsys: pytest.Ca
     assert main(words + compose_only) == 0, capsys.readouterr().err
 
 
+TUTORIAL = (ROOT / "docs" / "tutorial.md").read_text(encoding="utf-8")
+CONSOLE = re.findall(r"^```console\n\$ fracctl (.*?)\n(.*?)^```", TUTORIAL, flags=re.DOTALL | re.MULTILINE)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("command", "shown"), CONSOLE)
+def test_the_tutorial_shows_what_comes_out(
+    command: str, shown: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    code = main(shlex.split(command))
+    printed = capfd.readouterr()
+    assert code == (3 if shown.startswith("error: ") else 0)
+    assert (printed.out + printed.err).startswith(shown.partition("…")[0])
+
+
 def test_commands_are_looked_for_where_they_stand() -> None:
     found = commands()
     assert "fracctl run experiment=ic1_bands" in found, "in a line of text"
