@@ -11,7 +11,7 @@ from fracctl.reproduction.suites import Suite, read_suite, suites_directory
 
 ROWS = "reproduction.jsonl"
 """What `make docs` writes into the folder: a line of JSON for each section."""
-COLUMNS = ("quantity", "place", "published", "unit", "computed", "exact", "verdict", "reason")
+COLUMNS = ("quantity", "published", "computed", "exact", "verdict")
 
 
 def write_pages(folder: Path) -> list[Path]:
@@ -41,10 +41,7 @@ def _page(suite: Suite, sections: Sequence[Mapping[str, Any]]) -> Iterator[str]:
         counts = ", ".join(f"{count} {_words(word)}" for word, count in section["counts"].items())
         yield from (f"## {suite.sections[section['section']].title}", "")
         yield from (f"`fracctl reproduce {suite.name}/{section['section']}`: {counts}.", "")
-        yield from (_line(COLUMNS), _line(["---"] * len(COLUMNS)))
-        for row in section["rows"]:
-            yield _line([_cell(name, row[name]) for name in COLUMNS])
-        yield ""
+        yield from _table(section["rows"])
     yield from ("## What lies behind", "")
     yield from (
         f"```{{include}} ../../experiments/{suite.name}/README.md",
@@ -54,12 +51,19 @@ def _page(suite: Suite, sections: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     )
 
 
-def _cell(name: str, value: str | float | None) -> str:
-    if value is None:
-        return "-"
-    if isinstance(value, str):
-        return "" if (name, value) == ("unit", "1") else _words(value) if name == "verdict" else value
-    return f"{value:.5g}"
+def _table(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+    """Yield the lines of a table, and its notes: the reasons, each once."""
+    reasons = list(dict.fromkeys(row["reason"] for row in rows if row["reason"]))
+    yield from (_line(COLUMNS), _line(["---"] * len(COLUMNS)))
+    for row in rows:
+        unit = "" if row["unit"] == "1" else f" {row['unit']}"
+        note = f" ({reasons.index(row['reason']) + 1})" if row["reason"] else ""
+        numbers = ("-" if row[name] is None else f"{row[name]:.5g}" for name in ("computed", "exact"))
+        quantity = f"{row['quantity']} ({row['place']})"
+        yield _line([quantity, f"{row['published']}{unit}", *numbers, f"{_words(row['verdict'])}{note}"])
+    yield ""
+    yield from (f"{number}. {reason}" for number, reason in enumerate(reasons, 1))
+    yield ""
 
 
 def _words(name: str) -> str:

@@ -124,7 +124,7 @@ ROW = {
     "difference": -0.001,
     "verdict": "not_reproduced",
     "expected": "not_decidable",
-    "reason": "",
+    "reason": "It hangs on a step that is not given.",
 }
 
 
@@ -142,7 +142,8 @@ def test_pages_of_reproduction_hold_what_is_computed(tables: ModuleType, tmp_pat
     assert text.startswith("# Fractional control in linearized relative-orbit dynamics\n")
     assert read_suite("fractional_hcw").sections["out_of_plane"].title in text
     assert "0 reproduced, 1 not reproduced" in text
-    assert "| speed \\| of a law | Fig. 2 | 0.48 |  | 0.47906 | - | not reproduced |  |\n" in text
+    assert "| speed \\| of a law (Fig. 2) | 0.48 | 0.47906 | - | not reproduced (1) |\n" in text
+    assert "\n1. It hangs on a step that is not given.\n" in text
 
 
 def test_a_section_that_failed_stops_the_documentation(tables: ModuleType, tmp_path: Path) -> None:
