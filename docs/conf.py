@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import importlib.metadata
 import re
 import sys
@@ -16,6 +17,7 @@ sys.path.insert(0, str(HERE))
 from docutils.nodes import document  # noqa: E402
 from reproduction_tables import write_pages  # noqa: E402 - it lies beside this file
 from sphinx.addnodes import pending_xref  # noqa: E402
+from sphinx.util import logging  # noqa: E402
 
 project = "fracctl"
 author = "The fracctl authors"
@@ -32,6 +34,18 @@ autodoc_typehints = "description"
 autodoc_typehints_description_target = "documented"
 autodoc_default_options = {"members": True, "undoc-members": False, "show-inheritance": False}
 myst_enable_extensions = ["colon_fence"]
+ROOMS = (
+    "controllers",
+    "design",
+    "figures",
+    "flight",
+    "measures",
+    "plants",
+    "sampled",
+    "solvers",
+    "stability",
+    "surveys",
+)
 PAGES = {
     "README.md": "index",
     "CHANGELOG.md": "changelog",
@@ -46,11 +60,21 @@ def setup(app: Any) -> None:
     """Write the pages of reproduction, mend links, and read docstrings as they are written: |x| and k_p are text."""
     app.connect("builder-inited", _tables)
     app.connect("doctree-read", _mend_links)
+    app.connect("env-check-consistency", _miss_names)
     app.connect("autodoc-process-docstring", _plain_text, priority=100)
 
 
 def _tables(_app: Any) -> None:
     write_pages(HERE / "_generated")
+
+
+def _miss_names(_app: Any, env: Any) -> None:
+    """Warn of public names that the reference leaves out; constants stand in the sources."""
+    shown = {name.rpartition(".")[2] for name in env.get_domain("py").objects}
+    for room in ROOMS:
+        public = importlib.import_module(f"fracctl.{room}").__all__
+        if missing := [name for name in public if not name.isupper() and name not in shown]:
+            logging.getLogger(__name__).warning("library.md leaves out %s of fracctl.%s", ", ".join(missing), room)
 
 
 def _mend_links(_app: Any, doctree: document) -> None:

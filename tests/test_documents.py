@@ -20,16 +20,18 @@ COMPOSING = ("run", "show", "validate", "list", "export")
 
 
 def shell_lines(text: str) -> list[str]:
-    """Commands of ``sh`` blocks, and of ``console`` blocks behind their prompt."""
+    """Commands of ``sh`` blocks, and of ``console`` blocks behind their prompt, but for mistakes that are shown."""
     blocks = re.findall(r"^```sh\n(.*?)^```", text, flags=re.DOTALL | re.MULTILINE)
     prompts = re.findall(r"^```console\n(.*?)^```", text, flags=re.DOTALL | re.MULTILINE)
     lines = [line for block in blocks for line in block.replace("\\\n", " ").splitlines()]
-    return lines + [line[2:] for block in prompts for line in block.splitlines() if line.startswith("$ ")]
+    return lines + [
+        line for block in prompts for line in re.findall(r"^\$ (.*)\n(?!error: )", block, flags=re.MULTILINE)
+    ]
 
 
 def is_complete(command: str) -> bool:
     """Whether nothing has to be filled in: no DIR, no <run id>, no …, no name that is left out."""
-    return not re.search(r"\b[A-Z]{3,}\b|[<>…|]|=$|\boutputs/", command)
+    return not re.search(r"\b[A-Z]{3,}(_[A-Z]+)?\b|[<>…|]|=$|\boutputs/", command)
 
 
 def commands() -> list[str]:
