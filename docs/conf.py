@@ -32,7 +32,7 @@ html_title = f"fracctl {release}"
 autodoc_member_order = "bysource"
 autodoc_typehints = "description"
 autodoc_typehints_description_target = "documented"
-autodoc_default_options = {"members": True, "undoc-members": False, "show-inheritance": False}
+autodoc_default_options = {"members": True}
 myst_enable_extensions = ["colon_fence"]
 ROOMS = (
     "controllers",
