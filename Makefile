@@ -34,12 +34,15 @@ bench: $(VENV)/installed-bench
 reproduce: $(VENV)/installed
 	$(BIN)/fracctl reproduce
 
+# The tables of what is reproduced are part of the documentation; stored runs are used again.
 docs: $(VENV)/installed-docs
+	@mkdir -p docs/_generated
+	$(BIN)/fracctl reproduce --json > docs/_generated/reproduction.jsonl
 	$(BIN)/sphinx-build -W -q docs docs/_build
 	@echo docs/_build/index.html
 
 clean:
-	rm -rf $(VENV) build dist docs/_build .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) build dist docs/_build docs/_generated .mypy_cache .pytest_cache .ruff_cache .hypothesis
 
 $(BIN)/python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' \

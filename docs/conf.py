@@ -2,10 +2,22 @@
 
 from __future__ import annotations
 
+import importlib
 import importlib.metadata
 import re
+import sys
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parent
+sys.path.insert(0, str(HERE))
+
+from docutils.nodes import document  # noqa: E402
+from reproduction_tables import write_pages  # noqa: E402 - it lies beside this file
+from sphinx.addnodes import pending_xref  # noqa: E402
+from sphinx.util import logging  # noqa: E402
 
 project = "fracctl"
 author = "The fracctl authors"
@@ -20,14 +32,66 @@ html_title = f"fracctl {release}"
 autodoc_member_order = "bysource"
 autodoc_typehints = "description"
 autodoc_typehints_description_target = "documented"
-autodoc_default_options = {"members": True, "undoc-members": False, "show-inheritance": False}
+autodoc_default_options = {"members": True}
 myst_enable_extensions = ["colon_fence"]
-suppress_warnings = ["myst.xref_missing"]
+ROOMS = (
+    "controllers",
+    "design",
+    "figures",
+    "flight",
+    "measures",
+    "plants",
+    "sampled",
+    "solvers",
+    "stability",
+    "surveys",
+)
+PAGES = {
+    "README.md": "index",
+    "CHANGELOG.md": "changelog",
+    "CONTRIBUTING.md": "contributing",
+    "LICENSE": "license",
+    "experiments/README.md": "reproduction",
+}
+"""Files outside this folder, and where they are shown."""
 
 
 def setup(app: Any) -> None:
-    """Read docstrings as they are written: equations stand indented, |x| and k_p are plain text."""
+    """Write the pages of reproduction, mend links, and read docstrings as they are written: |x| and k_p are text."""
+    app.connect("builder-inited", _tables)
+    app.connect("doctree-read", _mend_links)
+    app.connect("env-check-consistency", _miss_names)
     app.connect("autodoc-process-docstring", _plain_text, priority=100)
+
+
+def _tables(_app: Any) -> None:
+    write_pages(HERE / "_generated")
+
+
+def _miss_names(_app: Any, env: Any) -> None:
+    """Warn of public names that the reference leaves out; constants stand in the sources."""
+    shown = {name.rpartition(".")[2] for name in env.get_domain("py").objects}
+    for room in ROOMS:
+        public = importlib.import_module(f"fracctl.{room}").__all__
+        if missing := [name for name in public if not name.isupper() and name not in shown]:
+            logging.getLogger(__name__).warning("library.md leaves out %s of fracctl.%s", ", ".join(missing), room)
+
+
+def _mend_links(_app: Any, doctree: document) -> None:
+    """Lead links of the repository, as from README.md to a file, to the page that shows the file."""
+    for node in doctree.findall(pending_xref):
+        if node.get("reftype") == "myst" and (page := _page_of(node["reftarget"])):
+            node.attributes |= {"refdomain": "doc", "reftarget": page, "reftargetid": None}
+
+
+def _page_of(target: str) -> str | None:
+    found = [path for path in (ROOT / target, ROOT / f"{target}.md") if path.is_file()]
+    if not found:
+        return None
+    name = found[0].relative_to(ROOT).as_posix()
+    if paper := re.fullmatch(r"experiments/(\w+)/README.md", name):
+        return f"_generated/{paper[1]}"
+    return PAGES.get(name, found[0].stem)
 
 
 def _plain_text(*event: Any) -> None:

@@ -130,6 +130,13 @@ def test_documents_name_targets_that_exist() -> None:
     "name",
     [
         "README.md",
+        "docs/tutorial.md",
+        "docs/own_plant.md",
+        "docs/monte_carlo.md",
+        "docs/reading_tables.md",
+        "docs/contour.md",
+        "docs/volterra.md",
+        "docs/collocation.md",
         "docs/time_delayed_feedback.md",
         "docs/method_of_steps.md",
         "docs/fractional_memory.md",
