@@ -7,7 +7,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from fracctl.cli.table import TURN, count, number, table, title
+from fracctl.cli.table import table
+from fracctl.report.numbers import count, number
 
 MOST_ROWS = 50
 """More rows of one objective stand in the file only."""
