@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from fracctl.cli.table import table
+from fracctl.cli.table import TURN, table, title
 from fracctl.report.numbers import count, number
 
 MOST_ROWS = 50

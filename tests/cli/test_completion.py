@@ -36,7 +36,7 @@ def words(line: str) -> list[str]:
 @pytest.mark.parametrize(
     ("line", "expected"),
     [
-        ("fracctl re", ["reproduce"]),
+        ("fracctl rep", ["report", "reproduce"]),
         ("fracctl run --mul", ["--multirun"]),
         ("fracctl run --cfg ", ["job"]),
         ("fracctl run --config-dir ", [FILES]),

@@ -55,7 +55,7 @@ def test_list_runs(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypat
         content |= {"configuration": {"objective": "settling_time"}, "provenance": {"started": started}}
         (tmp_path / "work" / name / "0123" / "run.json").write_text(json.dumps(content))
     with exclusive(tmp_path / "work" / "a" / ".0123.lock"):
-        assert lines(capsys, "list", "runs", "output_dir=work")[1].split()[1] == "running"
+        assert lines(capsys, "list", "runs", "output_dir=work")[1].split()[2] == "running"
     (tmp_path / "work" / "a" / "broken").mkdir()
     (tmp_path / "work" / "a" / "broken" / "run.json").write_text("{")
     found = [line.split() for line in lines(capsys, "list", "runs", "output_dir=work")]

@@ -182,7 +182,7 @@ TINY_DESIGN = [
     "survey.evaluations=480",
     "survey.starts=1",
     "evaluation.samples=4",
-    "survey.bounds.gains=[0,4]",
+    "survey.bounds.gains=[-4,4]",
     "~constraints.peak_acceleration_mm_s2",
 ]
 

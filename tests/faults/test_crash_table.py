@@ -232,7 +232,7 @@ def output_is_a_file(folder: Path) -> None:
 def killed_at_every_write(folder: Path) -> None:
     """Each attempt comes one part further; then they die at every write from ``run.json`` to the manifest."""
     for _ in range(3 * N_BLOCKS):
-        with dies_at(2), pytest.raises(Died):
+        with dies_at(3), pytest.raises(Died):
             perform(job(folder))
         if len(parts_in(folder)) == N_BLOCKS:
             break
