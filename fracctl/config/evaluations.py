@@ -11,7 +11,7 @@ from fracctl.config.fields import Name, Number, Strict, Typed, Whole, refusal, r
 from fracctl.config.options import construct, factory_of, typed_options_of
 from fracctl.dispersions import Distribution
 from fracctl.errors import ArgumentError
-from fracctl.flight.stages import STAGES
+from fracctl.flight import STAGES
 
 Positive = Annotated[Number, Field(gt=0.0)] | None
 """A positive number, or nothing."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -24,10 +24,11 @@ from fracctl.controllers import Saturation
 from fracctl.dispersions import Distribution
 from fracctl.elements import linearised_map, relative_state
 from fracctl.errors import ArgumentError, ConfigurationError
-from fracctl.flight import Surroundings
 from fracctl.plants import Chief
-from fracctl.sampled import Actuator, Navigation
 from fracctl.units import Scales, Spacecraft
+
+if TYPE_CHECKING:
+    from fracctl.flight import Surroundings
 
 _SECONDS = {"horizon_min": 60.0, "horizon_s": 1.0}
 
@@ -89,6 +90,9 @@ def surroundings(config: RunConfig, given: FlightEvaluation, plant: Any) -> Surr
         ConfigurationError: an impulse bit comes without a mass.
         ArgumentError: a dispersion or the true plant does not fit.
     """
+    from fracctl.flight import Surroundings  # loads the sampled laws
+    from fracctl.sampled import Actuator, Navigation
+
     scales, craft, thrusters = plant.scales, spacecraft(config), given.thrusters
     if scales is None:
         raise ArgumentError("plant", plant, "must have units for flights; set plant.scales")

@@ -11,7 +11,7 @@ import numpy as np
 from fracctl.arrays import Array
 from fracctl.dispersions import SAMPLE, spread, spreads
 from fracctl.evaluation import Conclusion
-from fracctl.flight.stages import STAGES
+from fracctl.flight.names import STAGES
 from fracctl.measures.settling_times import column_of
 
 QUANTILES, SURVIVAL = "quantiles", "survival"

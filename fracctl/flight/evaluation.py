@@ -15,7 +15,8 @@ from fracctl.errors import ArgumentError, UnsupportedError, suggestion
 from fracctl.evaluation import COUNTERS, LAW_NUMBER, Conclusion, Evaluation
 from fracctl.flight import beside, conclusion
 from fracctl.flight.measured import measured, names, takes
-from fracctl.flight.stages import CERTAIN, STAGES, Flown, Sampling, Stage, Surroundings
+from fracctl.flight.names import CERTAIN, STAGES, Stage
+from fracctl.flight.stages import Flown, Sampling, Surroundings
 from fracctl.loop import ClosedLoop
 from fracctl.memory_evaluation import LAW, NamedLaw, check_laws
 from fracctl.sampled import DiscreteController, SampledTrajectory, simulate

@@ -12,6 +12,7 @@ from fracctl.arrays import Floats
 from fracctl.dispersions import Distribution, draws
 from fracctl.errors import ArgumentError
 from fracctl.flight import uncertain
+from fracctl.flight.names import CERTAIN, Stage
 from fracctl.loop import ClosedLoop
 from fracctl.plants.linear import LinearPlant
 from fracctl.plants.state import StatePlant
@@ -19,19 +20,6 @@ from fracctl.sampled import Actuator, Memory, Navigation, SampledLaw, Window, me
 from fracctl.sampled.simulation import AntiWindup
 from fracctl.sampled.tolerance import Kind
 from fracctl.units import Spacecraft
-
-Stage = Literal["ideal", "sampled", "noisy", "nonlinear", "dispersed"]
-STAGES: tuple[Stage, ...] = ("ideal", "sampled", "noisy", "nonlinear", "dispersed")
-"""In the order of what they add."""
-ADDS: Mapping[Stage, str] = {
-    "ideal": "the law itself on the linear plant",
-    "sampled": "samples, hold, delay and a memory of fixed length",
-    "noisy": "noise of the navigation, and thrusters with their limits",
-    "nonlinear": "nonlinear motion",
-    "dispersed": "starts, spacecraft, noise and orbits as they are drawn",
-}
-CERTAIN: tuple[Stage, ...] = ("ideal", "sampled")
-"""Stages in which nothing is random."""
 
 
 @dataclass(frozen=True)

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from fracctl.arrays import Floats
 from fracctl.errors import UnsupportedError
 from fracctl.meshwise import MeshTrajectory
-from fracctl.plants.tether import Tether
+
+if TYPE_CHECKING:
+    from fracctl.plants.tether import Tether
 
 
 def tether_of(trajectory: MeshTrajectory, name: str) -> Tether:
@@ -16,6 +20,8 @@ def tether_of(trajectory: MeshTrajectory, name: str) -> Tether:
     Raises:
         UnsupportedError: the plant is another.
     """
+    from fracctl.plants.tether import Tether  # loads its kernels
+
     plant: object = trajectory.plant
     if not isinstance(plant, Tether):
         raise UnsupportedError(f"{name} is a measure of tethers, not of {type(plant).__name__}")
