@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -59,6 +59,12 @@ class Distribution:
         if self.kind == "uniform":
             return float(random.uniform(self.numbers[0], self.numbers[1]))
         return float(random.choice(np.array(self.numbers)))
+
+
+def check_names(dispersions: Mapping[str, Distribution], known: Collection[str]) -> None:
+    """Raise ArgumentError unless all that is dispersed is known."""
+    for wrong in set(dispersions) - set(known):
+        raise ArgumentError("dispersions", wrong, f"must be one of {', '.join(known)}{suggestion(wrong, known)}")
 
 
 def draws(distributions: Mapping[str, Distribution], seed: int, samples: Sequence[int]) -> dict[str, Floats]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from fracctl.arrays import Array, Floats, joined
 from fracctl.controllers import Saturation
-from fracctl.dispersions import SAMPLE, Distribution, draws, spreads
+from fracctl.dispersions import SAMPLE, Distribution, check_names, draws, spreads
 from fracctl.errors import ArgumentError, suggestion
 from fracctl.evaluation import COUNTERS, LAW_NUMBER, Conclusion, Evaluation, ParametrisedLaw, geometric_mean
 from fracctl.loop import ClosedLoop
@@ -82,10 +82,7 @@ class MemoryEvaluation(Evaluation):
             super().__post_init__()
         check_laws(self.laws, self.plant.components)
         states = [f"{_INITIAL}{name}" for name in self.plant.state_names]
-        known = [*states, *getattr(self.plant, "dispersed", ())]
-        for wrong in set(self.dispersions) - set(known):
-            allowed = f"must be one of {', '.join(known)}{suggestion(wrong, known)}"
-            raise ArgumentError("dispersions", wrong, allowed)
+        check_names(self.dispersions, [*states, *getattr(self.plant, "dispersed", ())])
 
     @property
     def dispersed(self) -> bool:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from fracctl.flight.names import ADDS, STAGES, Stage
+from fracctl.flight.names import STAGES, Stage
 from fracctl.lazy import loaded_at_first_use
 
 if TYPE_CHECKING:
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from fracctl.flight.stages import Sampling, Surroundings
 
 __all__ = [
-    "ADDS",
     "QUANTILES",
     "STAGES",
     "SURVIVAL",

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from fracctl.arrays import Array, Floats
-from fracctl.dispersions import Distribution, draws
+from fracctl.dispersions import Distribution, check_names, draws
 from fracctl.errors import ArgumentError
 from fracctl.evaluation import BEYOND_LIMITS, COUNTERS, Evaluation, geometric_mean
 from fracctl.flight import uncertain
@@ -45,7 +45,7 @@ class RobustEvaluation(Evaluation):
             raise ArgumentError("plant", self.plant, "must have units for dispersed starts; set plant.scales")
         if not self.dispersions:
             raise ArgumentError("dispersions", {}, "must hold at least one")
-        uncertain.checked(self.dispersions, uncertain.offset_names(self.plant))
+        check_names(self.dispersions, uncertain.offset_names(self.plant))
 
     @cached_property
     def _each(self) -> Evaluation:

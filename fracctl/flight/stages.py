@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 
 from fracctl.arrays import Floats
-from fracctl.dispersions import Distribution, draws
+from fracctl.dispersions import Distribution, check_names, draws
 from fracctl.errors import ArgumentError
 from fracctl.flight import uncertain
 from fracctl.flight.names import CERTAIN, Stage
@@ -93,7 +93,7 @@ class Surroundings:
         if self.truth is not None and self.truth.n_states != self.plant.n_states:
             allowed = f"must have {self.plant.n_states} states as the plant of the design, but has"
             raise ArgumentError("truth", self.truth, f"{allowed} {self.truth.n_states}; take plant=hcw")
-        uncertain.checked(self.dispersions, self.known)
+        check_names(self.dispersions, self.known)
         if uncertain.MASS in self.dispersions and self.spacecraft.mass_kg is None:
             raise ArgumentError("dispersions", uncertain.MASS, "needs spacecraft.mass_kg, which the law is made for")
 

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from fracctl.arrays import Floats
-from fracctl.dispersions import Distribution
-from fracctl.errors import ArgumentError, suggestion
 
 MASS, THRUST = "mass_kg", "thrust_factor"
 NOISES = ("position_noise_m", "velocity_noise_m_s")
@@ -27,12 +25,6 @@ def offset_names(plant: Any) -> list[str]:
 def bias_names(plant: Any) -> list[str]:
     """Names of errors of the navigation that stay over a flight."""
     return [f"{what}_bias_{c}{unit}" for what, unit in (("position", "_m"), ("velocity", "_m_s")) for c in _axes(plant)]
-
-
-def checked(dispersions: Mapping[str, Distribution], known: Collection[str]) -> None:
-    """Raise ArgumentError unless all names are known."""
-    for wrong in set(dispersions) - set(known):
-        raise ArgumentError("dispersions", wrong, f"must be one of {', '.join(known)}{suggestion(wrong, known)}")
 
 
 def starts(plant: Any, nominal: Floats, drawn: Mapping[str, Floats]) -> Floats:

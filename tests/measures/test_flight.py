@@ -12,6 +12,7 @@ from fracctl.config.build import build_evaluation
 from fracctl.config.compose import compose
 from fracctl.errors import ArgumentError, ConfigurationError
 from fracctl.measures.fuel import DeltaV, PeakForce, PeakThrust, Propellant, StationKeeping, magnitude_integral
+from fracctl.measures.hold_error import HoldError
 from fracctl.measures.in_units import InUnits
 from fracctl.measures.open_loop_bound import OpenLoopBound
 from fracctl.measures.overshoot_m import OvershootM
@@ -150,3 +151,14 @@ def test_the_peak_force_is_that_of_the_peak_acceleration() -> None:
     np.testing.assert_allclose(found["peak_force_n"], 0.5 * peak, rtol=1e-14)
     with pytest.raises(ArgumentError, match=r"spacecraft\.mass_kg"):
         PeakForce().for_flight(PLANT)
+
+
+def test_hold_error_of_free_motion_is_that_of_a_sine() -> None:
+    """w = A sin s has A/√2 over an orbit; a decaying loop holds what is left in its last orbit."""
+    measure = HoldError().for_flight(PLANT)
+    free = fc.solve(fc.ClosedLoop(PLANT), [0.0, 0.002], 6.0 * math.pi)
+    assert measure(free)["hold_error_m"] == pytest.approx([0.002 * PLANT.scales.length_m / math.sqrt(2.0)], rel=1e-8)
+    trajectory = flown("pd_alpha", 3.0)
+    late = trajectory(np.linspace(4.0 * math.pi, 6.0 * math.pi, 20_001))[..., 0]
+    expected = math.sqrt(float((late**2).mean())) * PLANT.scales.length_m
+    assert measure(trajectory)["hold_error_m"] == pytest.approx([expected], rel=1e-4)
