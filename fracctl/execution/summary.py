@@ -29,9 +29,9 @@ class Tally:
 
     def add(self, rows: Rows) -> None:
         """Count further rows."""
-        names, words = rows["initial_condition"].tolist(), rows["status"].tolist()
-        for (name, word), count in Counter(zip(names, words, strict=True)).items():
-            self._counts.setdefault(name, Counter())[word] += count
+        names, words = rows["initial_condition"], rows["status"]
+        for name in dict.fromkeys(names.tolist()):
+            self._counts.setdefault(name, Counter()).update(words[names == name].tolist())
 
     def total(self, word: str) -> int:
         """Return the number of rows with this status."""

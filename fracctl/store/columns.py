@@ -96,12 +96,12 @@ def to_rows(table: pa.Table) -> dict[str, Array]:
 
 
 def _to_numpy(column: pa.ChunkedArray) -> Array:
-    if column.type in (pa.string(), pa.bool_()) or (column.null_count and pa.types.is_integer(column.type)):
+    if column.null_count and pa.types.is_integer(column.type):
         objects = np.empty(len(column), dtype=object)
         objects[:] = column.to_pylist()
         return objects
     array: Array = column.to_numpy()
-    return array
+    return array.astype(object) if column.type == pa.bool_() else array
 
 
 def records_table(records: Iterable[Mapping[str, Any]], wanted: pa.Schema) -> pa.Table:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from fracctl.arrays import Array, Floats
-from fracctl.evaluation import Evaluation
+
+if TYPE_CHECKING:
+    from fracctl.evaluation import Evaluation
 
 Rows = Mapping[str, Array]
 """Rows of a table: arrays of one length by column name."""
