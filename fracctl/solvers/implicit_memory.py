@@ -16,7 +16,8 @@ from fracctl.fractional.sum_of_exponentials import sum_of_exponentials
 from fracctl.loop import ClosedLoop
 from fracctl.meshwise import MeshTrajectory
 from fracctl.plants.state import Event, StatePlant
-from fracctl.solvers.implicit_memory_kernel import BRACKETED, UNRESOLVED, march, room_for
+from fracctl.solvers.implicit_memory_equations import Given
+from fracctl.solvers.implicit_memory_kernel import BRACKETED, UNRESOLVED, Path, march, room_for
 from fracctl.solvers.members import positive, starting_states
 
 _GROWTH = 15.0
@@ -252,15 +253,15 @@ class _Problem:
         states[:, 0], auxiliary[:, 0] = self.start, first
         memory, demands = np.full((batch, count, m), np.nan), np.full((batch, count, m), np.nan)
         how, iterations = np.zeros((batch, count - 1), np.int8), np.zeros((batch, count - 1), np.int32)
-        numbers, given = plant.kernel_parameters(batch), self.law.numbers(self.plant, batch)
+        numbers, of_law = plant.kernel_parameters(batch), self.law.numbers(self.plant, batch)
         steps, room = np.empty(batch, dtype=np.int64), room_for(m, first.shape[1], len(kernel.rates))
         for i in range(batch):
-            steps[i] = march(
-                plant.acceleration, self.law.demand, mesh, numbers[i], given[i],
-                wanted[i], wanted_rate[i], orders[i], kernel.rates,
-                weights[i], self.limits[i], modes[i], states[i], memory[i], demands[i], auxiliary[i], how[i],
-                iterations[i], room,
+            given = Given(
+                mesh, numbers[i], of_law[i], wanted[i], wanted_rate[i], orders[i], kernel.rates, weights[i],
+                self.limits[i],
             )  # fmt: skip
+            path = Path(states[i], memory[i], demands[i], auxiliary[i], modes[i], how[i], iterations[i])
+            steps[i] = march(plant.acceleration, self.law.demand, given, path, room)
         demands[:, 0], memory[:, 0] = demands[:, 1], memory[:, 1]
         bound = kernel.error_bound.reshape(batch, m).max(axis=1)
         return _Run(mesh, states, memory, demands, auxiliary, how, iterations, steps, self.limits, bound)

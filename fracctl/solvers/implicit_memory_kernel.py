@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
@@ -25,7 +25,9 @@ from fracctl.solvers.implicit_memory_equations import (
     V_WANTED,
     WANTED,
     D,
+    Given,
     Q,
+    Room,
     bracketed,
     newton,
 )
@@ -34,16 +36,32 @@ NEWTON, BRACKETED, UNRESOLVED = 0, 1, 2
 """How the equations of a step were solved: by Newton's method, by bracketing each row in turn, or not."""
 _SMALL = 1e-3
 """Below it, exponentials are replaced by their series."""
+
+
+class Path(NamedTuple):
+    """What a march fills; the first rows of `states` and `auxiliary`, and the modes, hold the start."""
+
+    states: Floats
+    """[q, q'], (S + 1, 2m)."""
+    memory: Floats
+    """D^ν Δq, (S + 1, m)."""
+    demands: Floats
+    """(S + 1, m)."""
+    auxiliary: Floats
+    """z, (S + 1, p)."""
+    modes: Floats
+    """φ, (m, J), at the last time."""
+    how: Array
+    """How the equations of each step were solved, (S,)."""
+    iterations: Array
+    """Newton's iterations, (S,)."""
+
+
 _ROW, _ROWS = types.f8[::1], types.f8[:, ::1]
-_MARCH = types.i8(
-    types.FunctionType(ACCELERATION),
-    types.FunctionType(DEMAND),
-    *(_ROW, _ROW, _ROW, _ROWS, _ROWS, _ROW, _ROW),
-    *[_ROWS] * 7,
-    types.i1[::1],
-    types.i4[::1],
-    types.Tuple((_ROWS, _ROWS, *[_ROW] * 5, _ROWS, *[_ROW] * 3)),  # type: ignore[no-untyped-call]
-)
+_GIVEN = types.NamedTuple((_ROW, _ROW, _ROW, _ROWS, _ROWS, _ROW, _ROW, _ROWS, _ROWS), Given)  # type: ignore[no-untyped-call]
+_PATH = types.NamedTuple((*[_ROWS] * 5, types.i1[::1], types.i4[::1]), Path)  # type: ignore[no-untyped-call]
+_ROOM = types.NamedTuple((_ROWS, _ROWS, *[_ROW] * 5, _ROWS, *[_ROW] * 3), Room)  # type: ignore[no-untyped-call]
+_MARCH = types.i8(types.FunctionType(ACCELERATION), types.FunctionType(DEMAND), _GIVEN, _PATH, _ROOM)
 
 
 @within
@@ -78,28 +96,19 @@ def _lead(modes: Floats, decay: Floats, early: Floats, late: Floats, first: floa
 
 
 @within
-def _known_of_the_end(
-    n: int,
-    ratio: float,
-    states: Floats,
-    reference: Floats,
-    reference_rate: Floats,
-    orders: Floats,
-    weights: Floats,
-    decay: Floats,
-    modes: Floats,
-    known: Floats,
-) -> None:
+def _known_of_the_end(n: int, ratio: float, given: Given, path: Path, room: Room) -> None:
     """Fill `known`, but for the limits and D's share, for the step from n to n + 1."""
+    states, known, orders = path.states, room.known, given.orders
     m, earlier = len(orders), max(n - 1, 0)
     one, two = _before(ratio)
     for i in range(m):
         known[Q_KNOWN, i] = one * states[n, i] - two * states[earlier, i]
         known[V_KNOWN, i] = one * states[n, m + i] - two * states[earlier, m + i]
-        known[Q_WANTED, i] = reference[n + 1, i]
-        known[V_WANTED, i] = reference_rate[n + 1, i]
-        past = _remembered(weights[i], decay, modes[i])
-        known[D_KNOWN, i] = past + known[D_SHARE, i] * (1.0 - orders[i]) * (states[n, m + i] - reference_rate[n, i])
+        known[Q_WANTED, i] = given.reference[n + 1, i]
+        known[V_WANTED, i] = given.reference_rate[n + 1, i]
+        past = _remembered(given.weights[i], room.decay, path.modes[i])
+        rate = states[n, m + i] - given.reference_rate[n, i]
+        known[D_KNOWN, i] = past + known[D_SHARE, i] * (1.0 - orders[i]) * rate
 
 
 @within
@@ -118,9 +127,9 @@ def _known_of_auxiliary(n: int, ratio: float, auxiliary: Floats, base: Floats) -
 
 
 @within
-def _predict(n: int, h: float, times: Floats, states: Floats, v: Floats, found: Floats) -> None:
-    """Continue the rates of the last three times, or keep the last ones; in `v` and `found`."""
-    m = len(v)
+def _predict(n: int, h: float, times: Floats, states: Floats, room: Room) -> None:
+    """Continue the rates of the last three times, or keep the last ones."""
+    v, m = room.v, len(room.v)
     for i in range(m):
         v[i] = states[n, m + i]
         if n > 2:
@@ -128,7 +137,7 @@ def _predict(n: int, h: float, times: Floats, states: Floats, v: Floats, found: 
             earlier = (states[n - 1, m + i] - states[n - 2, m + i]) / (times[n - 1] - times[n - 2])
             bend = (slope - earlier) / (times[n] - times[n - 2])
             v[i] += h * (slope + (times[n + 1] - times[n - 1]) * bend)
-        found[START, i] = v[i]
+        room.found[START, i] = v[i]
 
 
 @within
@@ -148,121 +157,73 @@ def _limited(found: Floats, known: Floats) -> int:
 
 
 @within
-def _taken(
-    n: int,
-    v: Floats,
-    found: Floats,
-    z: Floats,
-    reference_rate: Floats,
-    decay: Floats,
-    early: Floats,
-    late: Floats,
-    modes: Floats,
-    states: Floats,
-    memory: Floats,
-    demands: Floats,
-    auxiliary: Floats,
-    peaks: Floats,
-) -> bool:
+def _solved(acceleration: Any, demand: Any, n: int, t: float, c: float, given: Given, path: Path, room: Room) -> None:
+    """Solve for the end t of step n, and tell how."""
+    count = newton(acceleration, demand, t, c, given, room)
+    path.how[n], path.iterations[n] = NEWTON, abs(count)
+    if count < 0:
+        m = len(room.v)
+        for i in range(m):
+            room.v[i] = path.states[n, m + i]
+        path.how[n] = BRACKETED if bracketed(acceleration, demand, t, c, given, room) else UNRESOLVED
+
+
+@within
+def _taken(n: int, given: Given, path: Path, room: Room) -> bool:
     """Store the end of step n and lead the modes there; return whether states and residuals are numbers."""
+    v, found, states = room.v, room.found, path.states
     m, finite = len(v), True
     for i in range(m):
         states[n + 1, i], states[n + 1, m + i] = found[Q, i], v[i]
-        memory[n + 1, i], demands[n + 1, i] = found[D, i], found[WANTED, i]
+        path.memory[n + 1, i], path.demands[n + 1, i] = found[D, i], found[WANTED, i]
         finite = finite and math.isfinite(found[Q, i]) and math.isfinite(v[i]) and math.isfinite(found[RESIDUAL, i])
-        before = states[n, m + i] - reference_rate[n, i]
-        _lead(modes[i], decay, early, late, before, found[ERROR_RATE, i])
-    for k in range(len(z)):
-        auxiliary[n + 1, k] = z[k]
-        peaks[k] = max(peaks[k], abs(z[k]))
+        before = states[n, m + i] - given.reference_rate[n, i]
+        _lead(path.modes[i], room.decay, room.early, room.late, before, found[ERROR_RATE, i])
+    for k in range(len(room.z)):
+        path.auxiliary[n + 1, k] = room.z[k]
+        room.peaks[k] = max(room.peaks[k], abs(room.z[k]))
     return finite
 
 
-def room_for(m: int, p: int, modes: int) -> tuple[Floats, ...]:
-    """Return the arrays that `march` works in: without any of its own it need not count who refers to them."""
-    vectors, filters = (np.zeros(p) for _ in range(3)), (np.zeros(modes) for _ in range(3))
-    return np.zeros((8, m)), np.zeros((10, m)), *vectors, np.zeros(m), np.zeros(1), np.zeros((m, 2 * m)), *filters
+def room_for(m: int, p: int, modes: int) -> Room:
+    """Return the arrays that `march` works in."""
+    z, base, peaks = np.zeros((3, p))
+    decay, early, late = np.zeros((3, modes))
+    matrix = np.zeros((m, 2 * m))
+    return Room(
+        np.zeros((8, m)), np.zeros((10, m)), z, base, peaks, np.zeros(m), np.zeros(1), matrix, decay, early, late
+    )
 
 
 @pointer_with(_MARCH, **BARE)
-def march(
-    acceleration: Any,
-    demand: Any,
-    times: Floats,
-    plant: Floats,
-    law: Floats,
-    reference: Floats,
-    reference_rate: Floats,
-    orders: Floats,
-    rates: Floats,
-    weights: Floats,
-    limits: Floats,
-    modes: Floats,
-    states: Floats,
-    memory: Floats,
-    demands: Floats,
-    auxiliary: Floats,
-    how: Array,
-    iterations: Array,
-    room: tuple[Floats, ...],
-) -> int:
-    """Make all steps of one member.
-
-    Args:
-        acceleration: of the plant.
-        demand: of the law.
-        times: ends of the S steps, (S + 1,).
-        plant: the plant's numbers.
-        law: those of the law.
-        reference: q_d at the times, (S + 1, m).
-        reference_rate: q_d', (S + 1, m).
-        orders: ν, (m,).
-        rates: of the sum of exponentials, (J,).
-        weights: its weights, (m, J).
-        limits: of the controls, lower and upper, (2, m).
-        modes: φ(0), (m, J); overwritten.
-        states: to be filled, (S + 1, 2m); holds [q(0), q'(0)].
-        memory: to be filled with D^ν Δq, (S + 1, m).
-        demands: to be filled, (S + 1, m).
-        auxiliary: to be filled, (S + 1, p); holds z(0).
-        how: to be filled with how the equations of each step were solved, (S,).
-        iterations: to be filled with Newton's iterations, (S,).
-        room: arrays to work in, see `room_for`.
+def march(acceleration: Any, demand: Any, given: Given, path: Path, room: Room) -> int:
+    """Make all steps of one member with the acceleration of its plant and the demand of its law.
 
     Returns:
         The number of steps taken before a state or an acceleration was no number.
     """
-    m = len(orders)
-    known, found, z, base, peaks, v, rate, matrix, decay, early, late = room
-    rate[0], matrix[0, m] = 1.0, math.nan
+    times, known, found, rate = given.times, room.known, room.found, room.rate
+    m = len(given.orders)
+    rate[0], room.matrix[0, m] = 1.0, math.nan
     for i in range(m):
-        known[LOWER, i], known[UPPER, i] = limits[0, i], limits[1, i]
-    for k in range(len(z)):
-        peaks[k] = abs(auxiliary[0, k])
+        known[LOWER, i], known[UPPER, i] = given.limits[0, i], given.limits[1, i]
+    for k in range(len(room.z)):
+        room.peaks[k] = abs(path.auxiliary[0, k])
     h, limited = 0.0, -1
     for n in range(len(times) - 1):
         ratio, h = (times[n + 1] - times[n]) / h if n else 0.0, times[n + 1] - times[n]
         if abs(ratio - 1.0) > 1e-12:
             rate[0] = 1.0
-            _filters(rates, h, decay, early, late)
-            _shares(h, orders, known)
+            _filters(given.rates, h, room.decay, room.early, room.late)
+            _shares(h, given.orders, known)
         at_limits = _limited(found, known)
         if at_limits != limited:
             ratio, rate[0] = 0.0, 1.0
         limited = at_limits
-        _known_of_the_end(n, ratio, states, reference, reference_rate, orders, weights, decay, modes, known)
-        _known_of_auxiliary(n, ratio, auxiliary, base)
-        _predict(n, h, times, states, v, found)
-        t, c = times[n + 1], h * (1.0 + ratio) / (1.0 + 2.0 * ratio)
-        count = newton(acceleration, demand, t, c, v, known, base, peaks, plant, law, found, z, matrix, rate)
-        how[n], iterations[n] = NEWTON, abs(count)
-        if count < 0:
-            for i in range(m):
-                v[i] = states[n, m + i]
-            solved = bracketed(acceleration, demand, t, c, v, known, base, peaks, plant, law, found, z, matrix)
-            how[n] = BRACKETED if solved else UNRESOLVED
-        if not _taken(
-            n, v, found, z, reference_rate, decay, early, late, modes, states, memory, demands, auxiliary, peaks
-        ):
+        _known_of_the_end(n, ratio, given, path, room)
+        _known_of_auxiliary(n, ratio, path.auxiliary, room.base)
+        _predict(n, h, times, path.states, room)
+        _solved(acceleration, demand, n, times[n + 1], h * (1.0 + ratio) / (1.0 + 2.0 * ratio), given, path, room)
+        if not _taken(n, given, path, room):
             return n
     return len(times) - 1
