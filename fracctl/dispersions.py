@@ -70,8 +70,8 @@ def check_names(dispersions: Mapping[str, Distribution], known: Collection[str])
 def draws(distributions: Mapping[str, Distribution], seed: int, samples: Sequence[int]) -> dict[str, Floats]:
     """Return the numbers of some samples by name, (s,) each.
 
-    A number depends on the seed, its sample and its name, whatever else is drawn: a sample can be drawn again by itself,
-    and a distribution more, or another order of them, leaves the numbers of the others as they were.
+    A number depends on the seed, its sample and its name, whatever else is drawn: a sample can be drawn again by
+    itself, and a distribution more, or another order of them, leaves the numbers of the others as they were.
     """
     return {
         name: np.array([distribution.draw(_generator(seed, sample, name)) for sample in samples], dtype=np.float64)

@@ -57,7 +57,7 @@ def test_a_sample_can_be_drawn_again_by_its_number(drawn: dict[str, np.ndarray])
 
 def test_a_number_does_not_depend_on_what_else_is_drawn(drawn: dict[str, np.ndarray]) -> None:
     backwards = draws(dict(reversed(DISTRIBUTIONS.items())), 0, range(20))
-    assert {name: values.tolist() for name, values in backwards.items()} == {n: v[:20].tolist() for n, v in drawn.items()}
+    assert {n: v.tolist() for n, v in backwards.items()} == {n: v[:20].tolist() for n, v in drawn.items()}
     alone = draws({"phase": DISTRIBUTIONS["phase"]}, 0, range(20))
     assert alone["phase"].tolist() == drawn["phase"][:20].tolist()
     twice = draws({"phase": DISTRIBUTIONS["phase"], "other": DISTRIBUTIONS["phase"]}, 0, range(20))

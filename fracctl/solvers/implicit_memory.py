@@ -226,11 +226,7 @@ class _Problem:
         self.tolerance = memory_tolerance
         batch, m = len(start), loop.plant.n_controls
         self.limits = np.empty((batch, 2, m))
-        if loop.saturation is None:
-            bound: Floats = np.full((1, 1), np.inf)
-        else:
-            bound = loop.saturation.limit.reshape(1, 1) if loop.saturation.limit.ndim == 0 else loop.saturation.limit
-            bound = bound.reshape(len(bound), -1)
+        bound = np.full((1, 1), np.inf) if loop.saturation is None else loop.saturation.limit
         self.limits[:, 1] = bound
         self.limits[:, 0] = -bound
 
