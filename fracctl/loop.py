@@ -17,7 +17,7 @@ from fracctl.errors import ArgumentError, UnsupportedError
 from fracctl.fractional.system import LinearFractionalSystem
 from fracctl.fractional.terms import FractionalTerm
 from fracctl.plants.linear import LinearPlant
-from fracctl.plants.state import StatePlant
+from fracctl.plants.state import StatePlant, batch_of
 
 
 class Need(StrEnum):
@@ -129,10 +129,11 @@ class ClosedLoop:
             own = {term.batch for term in self.delayed_terms}
         else:
             own = {law.batch if isinstance(law, MemoryLaw) else _law_batch(self.law_terms)}
-        sizes = {limited, *own} - {None}
-        if len(sizes - {1}) > 1:
-            raise ArgumentError("controller", f"a sum of batches of {sorted(map(str, sizes))}", "must have one size")
-        return max((size for size in sizes if size is not None), default=None)
+        sizes = sorted(size for size in {limited, batch_of(self.plant), *own} if size is not None)
+        if len({*sizes} - {1}) > 1:
+            found = f"in a loop of batches of {' and '.join(map(str, sizes))}"
+            raise ArgumentError("controller", found, "must have one batch size with the plant and the limits")
+        return max(sizes, default=None)
 
     def initial_values(self, initial_state: Floats) -> tuple[Floats, Floats]:
         """Split states (…, 2m) or (…, 2m+q) into y(0) and y'(0), (…, m+q); y' of auxiliary states is not needed."""

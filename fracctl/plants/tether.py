@@ -9,10 +9,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fracctl.arrays import Floats, batch_size, finite
+from fracctl.arrays import Array, Floats, batch_size, finite
 from fracctl.compiling import ACCELERATION, compiled_with, pointer_with
 from fracctl.errors import ArgumentError
-from fracctl.plants.state import Event, SecondOrder
+from fracctl.plants.state import Event, SecondOrder, of_rows
 from fracctl.units import EARTH_GRAVITATIONAL_PARAMETER_KM3_S2
 
 EARTH_RADIUS_KM = 6378.137
@@ -181,16 +181,26 @@ class Tether(SecondOrder):
         other._parameters = _parameters(float(e[0]), float(rho[0]), amplitudes, own_phase + phase.ravel())
         return other
 
+    @property
+    def batch(self) -> int | None:
+        """Batch size, None where all members share the disturbances."""
+        return len(self._parameters) if len(self._parameters) > 1 else None
+
+    def take(self, rows: Array) -> Tether:
+        """Return the plant of some members."""
+        if self.batch is None:
+            return self
+        other = copy.copy(self)
+        other._parameters = self._parameters[rows]
+        return other
+
     def kernel_parameters(self, batch: int) -> Floats:
         """Return the parameters of `acceleration` for each member of a batch, [e, ρ, d, phase], (b, 6).
 
         Raises:
             ArgumentError: the disturbances are those of another number of members.
         """
-        if len(self._parameters) not in (1, batch):
-            allowed = f"must have the batch size of the disturbances, {len(self._parameters)}"
-            raise ArgumentError("x", f"a batch of {batch}", allowed)
-        return np.repeat(self._parameters, batch // len(self._parameters), axis=0)
+        return of_rows(self._parameters, batch)
 
     def rates(self, t: Floats, x: Floats, u: Floats) -> Floats:
         """Return x' of x = [λ, θ, φ, λ', θ', φ'], (b, 6)."""

@@ -22,7 +22,7 @@ from fracctl.errors import ArgumentError, UnsupportedError
 from fracctl.loop import ClosedLoop, Need
 from fracctl.panels import Panel, PanelGrid
 from fracctl.plants.linear import LinearPlant
-from fracctl.plants.state import StatePlant
+from fracctl.plants.state import StatePlant, members_of
 from fracctl.solvers.base import Survey
 from fracctl.solvers.explicit_memory_law import highest_used, signals
 from fracctl.solvers.explicit_memory_mesh import step_edges
@@ -142,7 +142,7 @@ class ExplicitMemory:
             everyone = np.tile(rows, k)
             limit = None if loop.saturation is None else loop.saturation.take(everyone)
             states = start[:, rows].reshape(k * len(rows), n)
-            problem = Problem(loop.plant, law.take(everyone), limit, states, horizon)
+            problem = Problem(members_of(loop.plant, everyone), law.take(everyone), limit, states, horizon)
             for part in self._solved(problem, k):
                 yield _packed(part, rows, stable, k, self.tolerance)
 
@@ -253,7 +253,8 @@ def _is_second_order(plant: LinearPlant | StatePlant) -> bool:
     if n != 2 * m:
         return False
     probe = np.linspace(0.1, 0.9, n)[None]
-    rates: Booleans = plant.rates(np.zeros(1), probe, np.zeros((1, m)))[:, :m] == probe[:, m:]
+    one = members_of(plant, np.zeros(1, dtype=np.intp))
+    rates: Booleans = one.rates(np.zeros(1), probe, np.zeros((1, m)))[:, :m] == probe[:, m:]
     return bool(rates.all())
 
 

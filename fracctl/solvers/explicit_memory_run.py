@@ -11,7 +11,7 @@ from fracctl.arrays import Array, Booleans, Floats
 from fracctl.controllers.saturation import Saturation
 from fracctl.fractional.collocation import chebyshev_nodes, integral_matrix
 from fracctl.panels import Panel, PanelGrid
-from fracctl.plants.state import Event, StatePlant
+from fracctl.plants.state import Event, StatePlant, members_of
 from fracctl.solvers.explicit_memory_history import History
 from fracctl.solvers.explicit_memory_law import Signals
 from fracctl.solvers.explicit_memory_mesh import crossings
@@ -36,7 +36,8 @@ class Problem:
     def take(self, rows: Array) -> Problem:
         """Return some of the members."""
         limit = None if self.saturation is None else self.saturation.take(rows)
-        return replace(self, signals=self.signals.take(rows), saturation=limit, start=self.start[rows])
+        plant = members_of(self.plant, rows)
+        return replace(self, plant=plant, signals=self.signals.take(rows), saturation=limit, start=self.start[rows])
 
     @property
     def has_powers(self) -> bool:
@@ -51,7 +52,8 @@ class Problem:
             control = self.saturation(control)
         flat = np.ascontiguousarray(control).reshape(b * k, m)
         states = np.ascontiguousarray(x.transpose(1, 2, 0)).reshape(b * k, 2 * m)
-        rates = self.plant.rates(np.tile(t, b), states, flat)
+        plant = self.plant if k == 1 else members_of(self.plant, np.repeat(np.arange(b), k))
+        rates = plant.rates(np.tile(t, b), states, flat)
         return rates[:, m:].reshape(b, k, m).transpose(2, 0, 1), control.transpose(2, 0, 1)
 
 

@@ -141,7 +141,7 @@ def test_limits_by_axis_of_one_loop_are_no_batch() -> None:
         ),
         (
             lambda: ClosedLoop(RotatingEllipsoid(), DelayedFeedback([GAIN] * 3, TAU), Saturation([1.0, 2.0])),
-            "must have one size",
+            "must have one batch size with the plant and the limits, but is in a loop of batches of 2 and 3",
         ),
     ],
 )
