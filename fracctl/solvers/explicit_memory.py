@@ -196,6 +196,7 @@ def _packed(part: _Part, rows: Array, stable: Array, k: int, tolerance: float) -
     status[ended & (status != "failed")] = solved.ended[1][ended & (status != "failed")]
     status[~solved.complete] = np.where(_has_grown(solved), "diverged", "failed")[~solved.complete]
     shown = solved.alive & solved.complete[:, None]
+    end = np.where(solved.complete, np.minimum(solved.ended[0], solved.problem.horizon), 0.0)
 
     def at_nodes(values: Floats) -> Floats:
         return np.where(shown[:, None, :, None], values, np.nan).reshape(b, values.shape[1], len(solved.grid.times))
@@ -210,6 +211,8 @@ def _packed(part: _Part, rows: Array, stable: Array, k: int, tolerance: float) -
             initial_controls=np.ascontiguousarray(solved.controls[:, :, 0, 0]),
             rates=at_nodes(solved.values[:, m : 2 * m]),
             auxiliary=at_nodes(solved.values[:, 2 * m :]),
+            end=end,
+            events={name: np.where(times <= end, times, np.nan) for name, times in solved.events.items()},
             status=status,
             stable=verdict,
             error_estimate=np.where(np.isfinite(part.error), part.error, np.nan),

@@ -99,22 +99,27 @@ class Run:
         return np.concatenate([ends, times[times < end[members]]])
 
     @cached_property
+    def events(self) -> dict[str, Floats]:
+        """First time of each event, infinite where it does not happen, each (b,); not cut off where members end."""
+        return {event.name: self._first(event) for event in self.problem.plant.events}
+
+    def _first(self, event: Event) -> Floats:
+        b, n = len(self.values), 2 * self.problem.signals.n_positions
+        first = np.where(event.function(np.zeros(b), self.problem.start[:, :n]) < 0.0, 0.0, np.inf)
+        flat = np.moveaxis(self.values[:, :n], 1, -1).reshape(-1, n)
+        signs = event.function(np.tile(self.grid.times, b), flat).reshape(b, 1, *self.values.shape[2:])
+        members, found = crossings(self.values, self.edges, partial(_of_states, event, n), signs)
+        np.minimum.at(first, members, found)
+        return first
+
+    @cached_property
     def ended(self) -> tuple[Floats, Array]:
         """When members end, (b,), infinite for those that do not, and by which event, (b,) words or None."""
-        b, m = len(self.values), self.problem.signals.n_positions
-        end, names = np.full(b, np.inf), np.full(b, None, dtype=object)
-        times = self.grid.times
+        end, names = np.full(len(self.values), np.inf), np.full(len(self.values), None, dtype=object)
         for event in self.problem.plant.events:
-            if not event.terminal:
-                continue
-            at_once = event.function(np.zeros(b), self.problem.start[:, : 2 * m]) < 0.0
-            end[at_once], names[at_once] = 0.0, event.name
-            flat = np.moveaxis(self.values[:, : 2 * m], 1, -1).reshape(-1, 2 * m)
-            signs = event.function(np.tile(times, b), flat).reshape(b, 1, *self.values.shape[2:])
-            members, found = crossings(self.values, self.edges, partial(_of_states, event, 2 * m), signs)
-            for member, time in zip(members, found, strict=True):
-                if time < end[member]:
-                    end[member], names[member] = time, event.name
+            earlier = self.events[event.name] < end
+            if event.terminal:
+                end[earlier], names[earlier] = self.events[event.name][earlier], event.name
         return end, names
 
     @cached_property
