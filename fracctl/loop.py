@@ -17,7 +17,7 @@ from fracctl.errors import ArgumentError, UnsupportedError
 from fracctl.fractional.system import LinearFractionalSystem
 from fracctl.fractional.terms import FractionalTerm
 from fracctl.plants.linear import LinearPlant
-from fracctl.plants.state import StatePlant, batch_of
+from fracctl.plants.state import LimitedPlant, StatePlant, batch_of
 
 
 class Need(StrEnum):
@@ -37,7 +37,8 @@ class ClosedLoop:
     Args:
         plant: what is controlled, e.g. `fracctl.plants.HCWOutOfPlane()`.
         controller: the law, e.g. `fracctl.controllers.PDAlpha(k_p=0.85, k_d=2.0, alpha=0.91)`; None for free motion.
-        saturation: what the thrusters can give; None for no limit.
+        saturation: what the thrusters can give; None for the limits of the plant, if it has any, and `Saturation(inf)`
+            for no limits even so.
 
     Raises:
         ArgumentError: the shapes of the law's gains do not fit the plant.
@@ -49,6 +50,10 @@ class ClosedLoop:
     saturation: Saturation | None = None
 
     def __post_init__(self) -> None:
+        if self.saturation is None and self.controller is not None and isinstance(self.plant, LimitedPlant):
+            object.__setattr__(self, "saturation", Saturation(self.plant.limits, "axis"))
+        elif self.saturation is not None and self.saturation.is_none:
+            object.__setattr__(self, "saturation", None)
         if self.saturation is not None:
             self.saturation.check(self.plant.n_controls)
         self.batch  # noqa: B018 - a wrong shape is refused here, where the user sees which loop it is

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Literal
 
 import numpy as np
@@ -20,7 +21,7 @@ class Saturation:
 
     Args:
         limit: L > 0 over the acceleration scale of the plant. By norm () or (b,); by axis () or (m,), one for each of
-            m controls, and for batches (b, 1) or (b, m).
+            m controls, and for batches (b, 1) or (b, m). A single infinite one says that there is no limit.
         by: ``norm`` or ``axis``.
 
     Raises:
@@ -30,7 +31,8 @@ class Saturation:
     def __init__(self, limit: ArrayLike, by: Literal["norm", "axis"] = "norm") -> None:
         if by not in ("norm", "axis"):
             raise ArgumentError("by", repr(by), "must be 'norm' or 'axis'")
-        given, self.by = finite("limit", limit), by
+        self.is_none, self.by = np.ndim(limit) == 0 and limit == math.inf, by
+        given = np.array(math.inf) if self.is_none else finite("limit", limit)
         if not (given > 0.0).all():
             raise ArgumentError("limit", float(given.min()), "must be positive")
         if given.ndim > 2 or (by == "norm" and given.ndim == 2 and given.shape[1] > 1):

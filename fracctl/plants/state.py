@@ -86,6 +86,29 @@ class BatchedPlant(Protocol):
         ...
 
 
+@runtime_checkable
+class LimitedPlant(Protocol):
+    """A plant with limits of its controls, which hold in every loop that is not given others."""
+
+    limits: Floats
+    """Of the m controls, by axis, (1, m)."""
+
+
+@runtime_checkable
+class ConstrainedPlant(Protocol):
+    """A plant whose equations hold for some controls only: a tether pulls, and does not push."""
+
+    @property
+    def control_events(self) -> tuple[Event, ...]:
+        """What ends a run, or is recorded in it, with functions g(t, u) of the control instead of the state."""
+        ...
+
+
+def control_events(plant: object) -> tuple[Event, ...]:
+    """Return the events of the control that a plant has."""
+    return plant.control_events if isinstance(plant, ConstrainedPlant) else ()
+
+
 def batch_of(plant: object) -> int | None:
     """Return the batch size of a plant, None where all members share it."""
     return plant.batch if isinstance(plant, BatchedPlant) else None

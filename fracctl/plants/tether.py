@@ -51,7 +51,8 @@ class Tether(SecondOrder):
     These units vary along the orbit and two of the three positions are angles, so that there are no `scales`: metres
     are `length_m` λ, and `tension_n`, `torques_n_m`, `thruster_force_n` and `orbits` give the rest. The event
     ``collision`` is the tether's length falling to `shortest`: the two satellites meet, past it the equations mean
-    nothing; ``escaped`` is its growing to `longest`, more than there is.
+    nothing; ``escaped`` is its growing to `longest`, more than there is; ``slack`` a tension below zero, which no loop
+    within the bounds comes to.
 
     Args:
         eccentricity: e in [0, 1).
@@ -59,7 +60,8 @@ class Tether(SecondOrder):
         length_m: L, for units alone.
         mother_mass_kg: m₁, for units alone.
         subsatellite_mass_kg: m₂, for units alone.
-        tension: bounds of the tension ρ - τ_t; ρ is their mean.
+        tension: bounds of the tension ρ - τ_t; ρ is their mean. They and `torque` hold in every `ClosedLoop` that is
+            not given a saturation of its own.
         torque: bound of |τ_θ| and |τ_φ|.
         disturbance: amplitudes d of the three rows, (3,) or (b, 3).
         disturbance_phase: in radians, () or (b,).
@@ -126,6 +128,12 @@ class Tether(SecondOrder):
             Event("collision", lambda _, x: x[:, 0] - self.shortest, meaning=meaning),
             Event("escaped", lambda _, x: self.longest - x[:, 0], meaning=run_out),
         )
+
+    @property
+    def control_events(self) -> tuple[Event, ...]:
+        """A tension below zero."""
+        meaning = "the tension fell below zero, where a tether is slack and the equations end"
+        return (Event("slack", lambda _, u: self.rho - u[:, 0], meaning=meaning),)
 
     @property
     def orbital_period_s(self) -> float:

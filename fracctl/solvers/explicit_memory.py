@@ -201,24 +201,22 @@ def _packed(part: _Part, rows: Array, stable: Array, k: int, tolerance: float) -
     def at_nodes(values: Floats) -> Floats:
         return np.where(shown[:, None, :, None], values, np.nan).reshape(b, values.shape[1], len(solved.grid.times))
 
-    return Survey(
-        rows[part.rows],
-        Trajectory(
-            grid=solved.grid,
-            initial_state=solved.problem.start,
-            positions=at_nodes(solved.values[:, :m]),
-            controls_at_nodes=at_nodes(solved.controls),
-            initial_controls=np.ascontiguousarray(solved.controls[:, :, 0, 0]),
-            rates=at_nodes(solved.values[:, m : 2 * m]),
-            auxiliary=at_nodes(solved.values[:, 2 * m :]),
-            end=end,
-            events={name: np.where(times <= end, times, np.nan) for name, times in solved.events.items()},
-            status=status,
-            stable=verdict,
-            error_estimate=np.where(np.isfinite(part.error), part.error, np.nan),
-            counters={"nodes": part.nodes},
-        ),
+    trajectory = Trajectory(
+        grid=solved.grid,
+        initial_state=solved.problem.start,
+        positions=at_nodes(solved.values[:, :m]),
+        controls_at_nodes=at_nodes(solved.controls),
+        initial_controls=np.ascontiguousarray(solved.controls[:, :, 0, 0]),
+        rates=at_nodes(solved.values[:, m : 2 * m]),
+        auxiliary=at_nodes(solved.values[:, 2 * m :]),
+        end=end,
+        events={name: np.where(times <= end, times, np.nan) for name, times in solved.events.items()},
+        status=status,
+        stable=verdict,
+        error_estimate=np.where(np.isfinite(part.error), part.error, np.nan),
+        counters={"nodes": part.nodes},
     )
+    return Survey(rows[part.rows], trajectory)
 
 
 def _has_grown(solved: Run) -> Booleans:

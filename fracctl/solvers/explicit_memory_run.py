@@ -11,7 +11,7 @@ from fracctl.arrays import Array, Booleans, Floats
 from fracctl.controllers.saturation import Saturation
 from fracctl.fractional.collocation import chebyshev_nodes, integral_matrix
 from fracctl.panels import Panel, PanelGrid
-from fracctl.plants.state import Event, StatePlant, members_of
+from fracctl.plants.state import Event, StatePlant, control_events, members_of
 from fracctl.solvers.explicit_memory_history import History
 from fracctl.solvers.explicit_memory_law import Signals
 from fracctl.solvers.explicit_memory_mesh import crossings
@@ -101,14 +101,17 @@ class Run:
     @cached_property
     def events(self) -> dict[str, Floats]:
         """First time of each event, infinite where it does not happen, each (b,); not cut off where members end."""
-        return {event.name: self._first(event) for event in self.problem.plant.events}
+        plant, states = self.problem.plant, self.values[:, : 2 * self.problem.signals.n_positions]
+        of_states = {event.name: self._first(event, states) for event in plant.events}
+        return of_states | {event.name: self._first(event, self.controls) for event in control_events(plant)}
 
-    def _first(self, event: Event) -> Floats:
-        b, n = len(self.values), 2 * self.problem.signals.n_positions
-        first = np.where(event.function(np.zeros(b), self.problem.start[:, :n]) < 0.0, 0.0, np.inf)
-        flat = np.moveaxis(self.values[:, :n], 1, -1).reshape(-1, n)
-        signs = event.function(np.tile(self.grid.times, b), flat).reshape(b, 1, *self.values.shape[2:])
-        members, found = crossings(self.values, self.edges, partial(_of_states, event, n), signs)
+    def _first(self, event: Event, values: Floats) -> Floats:
+        """Return when an event of states or controls at the nodes (b, n, P, K) happens first, (b,)."""
+        b, n = values.shape[:2]
+        first = np.where(event.function(np.zeros(b), values[:, :, 0, 0]) < 0.0, 0.0, np.inf)
+        flat = np.moveaxis(values, 1, -1).reshape(-1, n)
+        signs = event.function(np.tile(self.grid.times, b), flat).reshape(b, 1, *values.shape[2:])
+        members, found = crossings(values, self.edges, partial(_of_nodes, event), signs)
         np.minimum.at(first, members, found)
         return first
 
@@ -116,7 +119,7 @@ class Run:
     def ended(self) -> tuple[Floats, Array]:
         """When members end, (b,), infinite for those that do not, and by which event, (b,) words or None."""
         end, names = np.full(len(self.values), np.inf), np.full(len(self.values), None, dtype=object)
-        for event in self.problem.plant.events:
+        for event in (*self.problem.plant.events, *control_events(self.problem.plant)):
             earlier = self.events[event.name] < end
             if event.terminal:
                 end[earlier], names[earlier] = self.events[event.name][earlier], event.name
@@ -161,9 +164,9 @@ class Run:
         return found
 
 
-def _of_states(event: Event, n_states: int, members: Array, times: Floats, values: Floats) -> Floats:
+def _of_nodes(event: Event, members: Array, times: Floats, values: Floats) -> Floats:
     del members
-    return event.function(times, values[:, :n_states])[:, None]
+    return event.function(times, values)[:, None]
 
 
 def run(problem: Problem, edges: Floats, nodes: int, tolerance: float) -> Run:

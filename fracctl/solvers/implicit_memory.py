@@ -16,6 +16,7 @@ from fracctl.fractional.sum_of_exponentials import sum_of_exponentials
 from fracctl.loop import ClosedLoop
 from fracctl.meshwise import MeshTrajectory
 from fracctl.plants.state import Event, StatePlant
+from fracctl.solvers.control_events import ended_by_controls
 from fracctl.solvers.implicit_memory_kernel import BRACKETED, UNRESOLVED, march, room_for
 from fracctl.solvers.members import positive, starting_states
 
@@ -126,7 +127,7 @@ class ImplicitMemory:
             status[~(error <= self.tolerance)] = "failed"
         status[(fine.steps < len(fine.times) - 1) & (ended == "")] = "diverged"
         assert isinstance(loop.controller, MemoryLaw)
-        return MeshTrajectory(
+        trajectory = MeshTrajectory(
             plant=loop.plant,
             law=loop.controller,
             times=fine.times,
@@ -148,6 +149,7 @@ class ImplicitMemory:
             },
             batched=batched,
         )
+        return ended_by_controls(loop.plant, trajectory)
 
 
 def graded_mesh(first: float, largest: float, horizon: float, longer: tuple[Floats, Floats] | None = None) -> Floats:

@@ -13,6 +13,7 @@ from fracctl.controllers.delayed_feedback import DelayedLaw, DelayedTerm
 from fracctl.errors import ArgumentError, UnsupportedError
 from fracctl.loop import ClosedLoop, Need
 from fracctl.plants.state import members_of
+from fracctl.solvers.control_events import ended_by_controls
 from fracctl.solvers.members import positive, starting_states, whole
 from fracctl.solvers.method_of_steps_adaptive import AdaptiveRun
 from fracctl.solvers.method_of_steps_events import Watch
@@ -109,7 +110,7 @@ class MethodOfSteps:
             steps, error = problem.refined(steps, watch, error, min(self.tolerance or _GOAL, _GOAL))
             problem.withdraw_doubtful(steps, watch, error)
         end = watch.end
-        return StepwiseTrajectory(
+        trajectory = StepwiseTrajectory(
             plant=loop.plant,
             steps=steps,
             terms=terms,
@@ -122,6 +123,7 @@ class MethodOfSteps:
             counters={"steps": np.array([np.searchsorted(e, last) for e, last in zip(steps.edges, end, strict=True)])},
             batched=batched,
         )
+        return ended_by_controls(loop.plant, trajectory)
 
 
 class _Problem:
