@@ -70,14 +70,17 @@ def check_names(dispersions: Mapping[str, Distribution], known: Collection[str])
 def draws(distributions: Mapping[str, Distribution], seed: int, samples: Sequence[int]) -> dict[str, Floats]:
     """Return the numbers of some samples by name, (s,) each.
 
-    A sample depends on the seed and its own number alone, so that it can be drawn again by itself.
+    A number depends on the seed, its sample and its name, whatever else is drawn: a sample can be drawn again by
+    itself, and a distribution more, or another order of them, leaves the numbers of the others as they were.
     """
-    table = {name: np.empty(len(samples)) for name in distributions}
-    for place, sample in enumerate(samples):
-        random = np.random.default_rng([seed, sample])
-        for name, distribution in distributions.items():
-            table[name][place] = distribution.draw(random)
-    return table
+    return {
+        name: np.array([distribution.draw(_generator(seed, sample, name)) for sample in samples], dtype=np.float64)
+        for name, distribution in distributions.items()
+    }
+
+
+def _generator(seed: int, sample: int, name: str) -> np.random.Generator:
+    return np.random.default_rng([seed, sample, *name.encode()])
 
 
 def quantile_interval(count: int, share: float) -> tuple[int | None, int | None]:

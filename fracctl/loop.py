@@ -17,7 +17,7 @@ from fracctl.errors import ArgumentError, UnsupportedError
 from fracctl.fractional.system import LinearFractionalSystem
 from fracctl.fractional.terms import FractionalTerm
 from fracctl.plants.linear import LinearPlant
-from fracctl.plants.state import StatePlant
+from fracctl.plants.state import LimitedPlant, StatePlant, batch_of
 
 
 class Need(StrEnum):
@@ -37,7 +37,8 @@ class ClosedLoop:
     Args:
         plant: what is controlled, e.g. `fracctl.plants.HCWOutOfPlane()`.
         controller: the law, e.g. `fracctl.controllers.PDAlpha(k_p=0.85, k_d=2.0, alpha=0.91)`; None for free motion.
-        saturation: what the thrusters can give; None for no limit.
+        saturation: what the thrusters can give; None for the limits of the plant, if it has any, and `Saturation(inf)`
+            for no limits even so.
 
     Raises:
         ArgumentError: the shapes of the law's gains do not fit the plant.
@@ -49,6 +50,10 @@ class ClosedLoop:
     saturation: Saturation | None = None
 
     def __post_init__(self) -> None:
+        if self.saturation is None and self.controller is not None and isinstance(self.plant, LimitedPlant):
+            object.__setattr__(self, "saturation", Saturation(self.plant.limits, "axis"))
+        elif self.saturation is not None and self.saturation.is_none:
+            object.__setattr__(self, "saturation", None)
         if self.saturation is not None:
             self.saturation.check(self.plant.n_controls)
         self.batch  # noqa: B018 - a wrong shape is refused here, where the user sees which loop it is
@@ -129,10 +134,11 @@ class ClosedLoop:
             own = {term.batch for term in self.delayed_terms}
         else:
             own = {law.batch if isinstance(law, MemoryLaw) else _law_batch(self.law_terms)}
-        sizes = {limited, *own} - {None}
-        if len(sizes - {1}) > 1:
-            raise ArgumentError("controller", f"a sum of batches of {sorted(map(str, sizes))}", "must have one size")
-        return max((size for size in sizes if size is not None), default=None)
+        sizes = sorted(size for size in {limited, batch_of(self.plant), *own} if size is not None)
+        if len({*sizes} - {1}) > 1:
+            found = f"in a loop of batches of {' and '.join(map(str, sizes))}"
+            raise ArgumentError("controller", found, "must have one batch size with the plant and the limits")
+        return max(sizes, default=None)
 
     def initial_values(self, initial_state: Floats) -> tuple[Floats, Floats]:
         """Split states (…, 2m) or (…, 2m+q) into y(0) and y'(0), (…, m+q); y' of auxiliary states is not needed."""

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fracctl.arrays import Array, Floats, joined
-from fracctl.controllers import Saturation
 from fracctl.dispersions import SAMPLE, Distribution, check_names, draws, spreads
 from fracctl.errors import ArgumentError, suggestion
 from fracctl.evaluation import COUNTERS, LAW_NUMBER, Conclusion, Evaluation, ParametrisedLaw, geometric_mean
 from fracctl.loop import ClosedLoop
 from fracctl.measures.tethers import targets
+from fracctl.plants.state import control_events
 
 if TYPE_CHECKING:
     from fracctl.meshwise import MeshTrajectory
@@ -128,8 +128,7 @@ class MemoryEvaluation(Evaluation):
         else:
             law, values = self.law, {**self.parameters, **design}  # type: ignore[dict-item]
         made: Any = law.from_parameters(plant.components, values)
-        limits = getattr(plant, "limits", None)
-        return ClosedLoop(plant, made, None if limits is None else Saturation(limits, "axis"))
+        return ClosedLoop(plant, made)
 
     def __call__(self, design: Mapping[str, Floats]) -> dict[str, Array]:
         """Return the rows of b design points: all points of the first initial condition, then of the next."""
@@ -238,7 +237,7 @@ class MemoryEvaluation(Evaluation):
         return Conclusion({LAWS: records}, {LAWS: records}, tuple(notes))
 
     def _endings(self, rows: Mapping[str, Array]) -> Iterator[str]:
-        events = {event.name: event.meaning for event in getattr(self.plant, "events", ())}
+        events = {event.name: event.meaning for event in (*self.plant.events, *control_events(self.plant))}
         for word in dict.fromkeys(rows["status"].tolist()):
             if word in events:
                 count = int((rows["status"] == word).sum())

@@ -8,18 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fracctl.arrays import Array, Booleans, Floats, finite
+from fracctl.arrays import Array, Booleans, Floats
 from fracctl.controllers.memory import MemoryLaw
-from fracctl.errors import ArgumentError
 from fracctl.plants.state import StatePlant
+from fracctl.trajectory import AnyTrajectory
 
 
 @dataclass(frozen=True)
-class MeshTrajectory:
-    """Trajectories of a batch of b loops with m positions on the T times of a mesh.
-
-    Results carry the batch axis only where loop or initial state did. Behind the `end` of a member they are NaN.
-    """
+class MeshTrajectory(AnyTrajectory):
+    """Trajectories of a batch of b loops with m positions on the T times of a mesh."""
 
     plant: StatePlant
     law: MemoryLaw
@@ -36,9 +33,7 @@ class MeshTrajectory:
     limits: Floats
     """Lower and upper limits of the controls, (b, 2, m)."""
     end: Floats
-    """When each member ended: the horizon, a terminal event, or where its motion could not be followed, (b,)."""
     events: Mapping[str, Floats]
-    """First time of each event of the plant, NaN where it did not happen, each (b,)."""
     status: Array
     """A word each, (b,): ``ok``, the name of a terminal event, ``diverged`` (not finite) or ``failed`` (an equation
     was not solved, or the error is above the tolerance)."""
@@ -50,22 +45,11 @@ class MeshTrajectory:
     counters: Mapping[str, Array]
     """``steps``, their Newton ``iterations``, steps that were ``bracketed`` and ``unresolved``, each (b,)."""
     batched: bool = True
-    """Whether results carry the batch axis."""
 
     @property
     def horizon(self) -> float:
         """The last time of the mesh."""
         return float(self.times[-1])
-
-    @property
-    def states(self) -> Floats:
-        """States at `times`, (b, T, 2m), or (T, 2m) for a single loop."""
-        return self._shown(self.times, self.on_mesh.copy())
-
-    @property
-    def controls(self) -> Floats:
-        """Controls at `times`, (b, T, m), or (T, m) for a single loop."""
-        return self._shown(self.times, self.controls_on_mesh)
 
     @property
     def controls_on_mesh(self) -> Floats:
@@ -85,7 +69,7 @@ class MeshTrajectory:
         Raises:
             ArgumentError: a time lies outside [0, horizon].
         """
-        t = self._checked(times)
+        t = self._checked(times)[0]
         return self._shown(t, self._at(t))
 
     def control(self, times: ArrayLike) -> Floats:
@@ -94,7 +78,7 @@ class MeshTrajectory:
         Raises:
             ArgumentError: a time lies outside [0, horizon].
         """
-        t = self._checked(times)
+        t = self._checked(times)[0]
         return self._shown(t, np.clip(self._lines(self.demands, t), self.limits[:, :1], self.limits[:, 1:]))
 
     def demand(self, times: ArrayLike) -> Floats:
@@ -103,7 +87,7 @@ class MeshTrajectory:
         Raises:
             ArgumentError: a time lies outside [0, horizon].
         """
-        t = self._checked(times)
+        t = self._checked(times)[0]
         return self._shown(t, self._lines(self.demands, t))
 
     def _at(self, t: Floats) -> Floats:
@@ -121,16 +105,3 @@ class MeshTrajectory:
         y = ((t - self.times[place]) / (self.times[place + 1] - self.times[place]))[:, None]
         lines: Floats = values[:, place] + y * (values[:, place + 1] - values[:, place])
         return lines
-
-    def _shown(self, t: Floats, values: Floats) -> Floats:
-        values[t > self.end[:, None]] = np.nan
-        return values if self.batched else values[0]
-
-    def _checked(self, times: ArrayLike) -> Floats:
-        t = np.atleast_1d(finite("times", times))
-        if t.ndim > 1:
-            raise ArgumentError("times", f"of shape {t.shape}", "must have shape (t,)")
-        if t.size and (t.min() < 0.0 or t.max() > self.horizon * (1.0 + 1e-12)):
-            wrong = t.min() if t.min() < 0.0 else t.max()
-            raise ArgumentError("times", float(wrong), f"must lie in [0, {self.horizon:g}], the solved horizon")
-        return t

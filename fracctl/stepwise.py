@@ -9,12 +9,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fracctl.arrays import Array, Floats, finite
+from fracctl.arrays import Array, Floats
 from fracctl.compiling import compiled
 from fracctl.controllers.delayed_feedback import DelayedTerm, History
 from fracctl.controllers.saturation import Saturation
-from fracctl.errors import ArgumentError, UnsupportedError
+from fracctl.errors import UnsupportedError
 from fracctl.plants.state import StatePlant
+from fracctl.trajectory import AnyTrajectory
 
 
 @dataclass(frozen=True)
@@ -57,12 +58,8 @@ class Steps:
 
 
 @dataclass(frozen=True)
-class StepwiseTrajectory:
-    """Trajectories of a batch of b loops with n states and m controls.
-
-    `states` and `controls` carry the batch axis only where loop or initial state did. Behind the `end` of a member its
-    states and controls are NaN.
-    """
+class StepwiseTrajectory(AnyTrajectory):
+    """Trajectories of a batch of b loops with n states and m controls."""
 
     plant: StatePlant
     steps: Steps
@@ -72,9 +69,7 @@ class StepwiseTrajectory:
     """What the thrusters can give."""
     horizon: float
     end: Floats
-    """When each member ended: the horizon, a terminal event, or where its motion could not be followed, (b,)."""
     events: Mapping[str, Floats]
-    """First time of each event of the plant, NaN where it did not happen, each (b,)."""
     status: Array
     """A word each, (b,): ``ok``, the name of a terminal event, ``diverged`` (not finite, or too fast for its steps) or
     ``failed`` (above the tolerance)."""
@@ -84,7 +79,6 @@ class StepwiseTrajectory:
     counters: Mapping[str, Array]
     """What the solve cost, ``steps``, each (b,)."""
     batched: bool = True
-    """Whether results carry the batch axis."""
 
     @cached_property
     def times(self) -> Floats:
@@ -93,23 +87,13 @@ class StepwiseTrajectory:
         shared = bool(np.all(edges == edges[:1]))
         return edges[0] if shared else edges
 
-    @property
-    def states(self) -> Floats:
-        """States at `times`, (b, t, n), or (t, n) for a single loop."""
-        return self(self.times)
-
-    @property
-    def controls(self) -> Floats:
-        """Controls at `times`, (b, t, m), or (t, m) for a single loop."""
-        return self.control(self.times)
-
     def __call__(self, times: ArrayLike) -> Floats:
         """Return the states at times (t,), or (b, t) for each member its own, (b, t, n), or (t, n) for a single loop.
 
         Raises:
             ArgumentError: a time lies outside [0, horizon].
         """
-        return self._shown(times, self.steps(self._checked(times)))
+        return self._shown(times, self.steps(self._own(times)))
 
     def control(self, times: ArrayLike) -> Floats:
         """Return the controls at times as in a call, (b, t, m), or (t, m); at a jump what follows it.
@@ -117,7 +101,7 @@ class StepwiseTrajectory:
         Raises:
             ArgumentError: a time lies outside [0, horizon].
         """
-        demand = self._demand(self._checked(times))
+        demand = self._demand(self._own(times))
         return self._shown(times, demand if self.saturation is None else self.saturation(demand))
 
     def delay(self, times: ArrayLike) -> Floats:
@@ -129,7 +113,7 @@ class StepwiseTrajectory:
         """
         if not self.terms:
             raise UnsupportedError("a free motion has no delay")
-        t = self._checked(times)
+        t = self._own(times)
         constant = np.array(np.broadcast_to(self.terms[0].delay[:, None], t.shape))
         return self._shown(times, constant if self.steps.delay is None else self.steps.delay(t)[..., 0])
 
@@ -139,7 +123,7 @@ class StepwiseTrajectory:
         Raises:
             ArgumentError: a time lies outside [0, horizon].
         """
-        return self._shown(times, self._demand(self._checked(times)))
+        return self._shown(times, self._demand(self._own(times)))
 
     def _demand(self, t: Floats) -> Floats:
         total = np.zeros((*t.shape, self.plant.n_controls))
@@ -150,20 +134,9 @@ class StepwiseTrajectory:
             total -= np.where(active[..., None], np.einsum("btmn,btn->btm", term.gains(t), difference), 0.0)
         return total
 
-    def _shown(self, times: ArrayLike, values: Floats) -> Floats:
-        t = self._checked(times)
-        values[t > self.end[:, None]] = np.nan
-        return values if self.batched else values[0]
-
-    def _checked(self, times: ArrayLike) -> Floats:
-        t = np.atleast_1d(finite("times", times))
-        batch = len(self.end)
-        if t.ndim > 2 or (t.ndim == 2 and len(t) != batch):
-            raise ArgumentError("times", f"of shape {t.shape}", f"must have shape (t,) or ({batch}, t)")
-        if t.size and (t.min() < 0.0 or t.max() > self.horizon * (1.0 + 1e-12)):
-            wrong = t.min() if t.min() < 0.0 else t.max()
-            raise ArgumentError("times", float(wrong), f"must lie in [0, {self.horizon:g}], the solved horizon")
-        return np.broadcast_to(t, (batch, t.shape[-1]))
+    def _own(self, times: ArrayLike) -> Floats:
+        t = self._checked(times, own=True)
+        return np.broadcast_to(t, (len(self.end), t.shape[1]))
 
 
 @compiled

@@ -55,6 +55,15 @@ def test_a_sample_can_be_drawn_again_by_its_number(drawn: dict[str, np.ndarray])
     assert draws(DISTRIBUTIONS, 1, [17])["speed"] != again["speed"], "another seed, other numbers"
 
 
+def test_a_number_does_not_depend_on_what_else_is_drawn(drawn: dict[str, np.ndarray]) -> None:
+    backwards = draws(dict(reversed(DISTRIBUTIONS.items())), 0, range(20))
+    assert {n: v.tolist() for n, v in backwards.items()} == {n: v[:20].tolist() for n, v in drawn.items()}
+    alone = draws({"phase": DISTRIBUTIONS["phase"]}, 0, range(20))
+    assert alone["phase"].tolist() == drawn["phase"][:20].tolist()
+    twice = draws({"phase": DISTRIBUTIONS["phase"], "other": DISTRIBUTIONS["phase"]}, 0, range(20))
+    assert not np.isin(twice["other"], twice["phase"]).any(), "two names, two numbers"
+
+
 def test_no_spread_is_the_mean() -> None:
     sure = {"a": Distribution("normal", (0.7, 0.0)), "b": Distribution("uniform", (2.0, 2.0))}
     table = draws({**sure, "c": Distribution("choice", (5.0,))}, 3, range(4))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Literal
 
 import numpy as np
@@ -19,7 +20,8 @@ class Saturation:
     By norm the direction is kept, as one engine on a gimbal gives it; by axis each pair of thrusters has its own limit.
 
     Args:
-        limit: L > 0, () or (b,); by axis also (1, m) or (b, m). Over the acceleration scale of the plant.
+        limit: L > 0 over the acceleration scale of the plant. By norm () or (b,); by axis () or (m,), one for each of
+            m controls, and for batches (b, 1) or (b, m). A single infinite one says that there is no limit.
         by: ``norm`` or ``axis``.
 
     Raises:
@@ -29,17 +31,17 @@ class Saturation:
     def __init__(self, limit: ArrayLike, by: Literal["norm", "axis"] = "norm") -> None:
         if by not in ("norm", "axis"):
             raise ArgumentError("by", repr(by), "must be 'norm' or 'axis'")
-        self.limit, self.by = finite("limit", limit), by
-        if not (self.limit > 0.0).all():
-            raise ArgumentError("limit", float(self.limit.min()), "must be positive")
-        if self.limit.ndim > 1 + (by == "axis"):
-            shapes = "(), (b,), (1, m) or (b, m)" if by == "axis" else "() or (b,)"
-            raise ArgumentError("limit", f"of shape {self.limit.shape}", f"must have shape {shapes}")
-
-    @property
-    def batch(self) -> int | None:
+        self.is_none, self.by = np.ndim(limit) == 0 and limit == math.inf, by
+        given = np.array(math.inf) if self.is_none else finite("limit", limit)
+        if not (given > 0.0).all():
+            raise ArgumentError("limit", float(given.min()), "must be positive")
+        if given.ndim > 2 or (by == "norm" and given.ndim == 2 and given.shape[1] > 1):
+            shapes = "(), (m,), (b, 1) or (b, m)" if by == "axis" else "() or (b,)"
+            raise ArgumentError("limit", f"of shape {given.shape}", f"must have shape {shapes}")
+        self.limit = np.atleast_2d(given) if by == "axis" else given.reshape(-1, 1)
+        shared = given.ndim == 0 or (by == "axis" and len(self.limit) == 1)
+        self.batch = None if shared else len(self.limit)
         """Batch size, None for limits that all members share."""
-        return len(self.limit) if self.limit.ndim and (self.limit.ndim == 1 or len(self.limit) > 1) else None
 
     def __call__(self, demand: Floats) -> Floats:
         """Return the controls that come of demands (b, …, m), shaped as these."""
@@ -64,10 +66,9 @@ class Saturation:
 
     def check(self, n_controls: int) -> None:
         """Raise ArgumentError unless the limit fits a plant with m controls."""
-        if self.limit.ndim == 2 and self.limit.shape[1] != n_controls:
-            allowed = f"must have shape (), (b,), (1, {n_controls}) or (b, {n_controls}) for this plant"
-            raise ArgumentError("limit", f"of shape {self.limit.shape}", allowed)
+        if self.limit.shape[1] not in (1, n_controls):
+            shapes = "() or (b, 1)" if n_controls == 1 else f"(), ({n_controls},), (b, 1) or (b, {n_controls})"
+            raise ArgumentError("limit", f"of shape {self.limit.shape}", f"must have shape {shapes} for this plant")
 
     def _beside(self, demand: Floats) -> Floats:
-        limit = self.limit.reshape(1, 1) if self.limit.ndim == 0 else self.limit.reshape(len(self.limit), -1)
-        return limit.reshape(len(limit), *[1] * (demand.ndim - 2), limit.shape[1])
+        return self.limit.reshape(len(self.limit), *[1] * (demand.ndim - 2), self.limit.shape[1])

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from fracctl.arrays import Floats
+from fracctl.measures.base import OfTrajectories
 from fracctl.measures.mesh_lines import controls
 from fracctl.measures.tethers import tether_of
 from fracctl.meshwise import MeshTrajectory
 
 
-class ActuationEffort:
+class ActuationEffort(OfTrajectories):
     """∫ |τ| df of each control up to a member's end: of the tension's control over m̄ ḟ² L, of the torques over m̄ ḟ² L².
 
     Controls are straight lines between the times of the mesh.

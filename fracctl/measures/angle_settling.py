@@ -6,12 +6,13 @@ import numpy as np
 
 from fracctl.arrays import Floats
 from fracctl.errors import ArgumentError
+from fracctl.measures.base import OfTrajectories
 from fracctl.measures.mesh_cubics import cubics
 from fracctl.measures.tethers import targets, tether_of
 from fracctl.meshwise import MeshTrajectory
 
 
-class AngleSettling:
+class AngleSettling(OfTrajectories):
     """When the in-plane and out-of-plane angles come within a threshold of their targets for good, and how far past.
 
     Settling is f/2π of the last crossing, +inf where an angle is outside at the horizon or the member ended before.

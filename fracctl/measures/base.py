@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from functools import wraps
 from typing import Any, Protocol, runtime_checkable
 
 from fracctl.arrays import Floats
+from fracctl.errors import UnsupportedError
 from fracctl.loop import ClosedLoop
 from fracctl.meshwise import MeshTrajectory
 from fracctl.stepwise import StepwiseTrajectory
@@ -77,3 +80,38 @@ def trajectories_of(kind: Any) -> str | None:
     hint = next(iter(getattr(kind.__call__, "__annotations__", {}).values()), None)
     name = getattr(hint, "__name__", str(hint))
     return name if name in TRAJECTORIES else None
+
+
+def check_kind(name: str, wanted: str | None, trajectory: object) -> None:
+    """Raise UnsupportedError, with what measures the trajectory instead, where a measure is made for another kind."""
+    given = type(trajectory).__name__
+    if wanted not in (None, given) and given in TRAJECTORIES:
+        meant = f"trajectories of {TRAJECTORIES[str(wanted)]}, not of {TRAJECTORIES[given]}"
+        raise UnsupportedError(f"{name} is made for {meant}; for these there are {', '.join(_measures_of(given))}")
+
+
+def _measures_of(trajectories: str) -> Iterator[str]:
+    from fracctl import measures
+
+    for name in measures.__all__:
+        found = getattr(measures, name)
+        if isinstance(found, type) and issubclass(found, OfTrajectories) and trajectories_of(found) == trajectories:
+            yield name
+
+
+class OfTrajectories:
+    """A measure that refuses, in a sentence, trajectories of another class than its call is annotated with."""
+
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        if "__call__" not in cls.__dict__:
+            return
+        call, wanted = cls.__call__, trajectories_of(cls)
+
+        @wraps(call)
+        def checked(self: Any, trajectory: Any) -> dict[str, Floats]:
+            check_kind(cls.__name__, wanted, trajectory)
+            found: dict[str, Floats] = call(self, trajectory)
+            return found
+
+        cls.__call__ = checked  # type: ignore[method-assign]

@@ -6,11 +6,12 @@ import numpy as np
 
 from fracctl.arrays import Floats
 from fracctl.errors import ArgumentError
+from fracctl.measures.base import OfTrajectories
 from fracctl.measures.periods import SAMPLES, n_positions
 from fracctl.stepwise import StepwiseTrajectory
 
 
-class Boundedness:
+class Boundedness(OfTrajectories):
     """The largest |ξ| over the last part of a run, and whether the run reached its horizon.
 
     ``bounded`` is 1 where no terminal event ended the member and it did not diverge, 0 otherwise (why is its status);

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from fracctl.arrays import Floats
+from fracctl.measures.base import OfTrajectories
 from fracctl.measures.mesh_lines import begin_of, controls
 from fracctl.measures.tethers import tether_of
 from fracctl.meshwise import MeshTrajectory
 
 
-class Chattering:
+class Chattering(OfTrajectories):
     """Total variation of each control from a while after the start to a member's end, in the units of the controls.
 
     A control that follows a smooth disturbance has some too: 4 amplitudes a period for a sine.

@@ -7,11 +7,12 @@ import numpy as np
 from fracctl.arrays import Floats
 from fracctl.errors import ArgumentError
 from fracctl.features import absolute_integral
+from fracctl.measures.base import OfTrajectories
 from fracctl.measures.samples import samples_of
 from fracctl.trajectory import Trajectory
 
 
-class ControlEffort:
+class ControlEffort(OfTrajectories):
     """U = Σ_i ∫₀^S |υ_i| ds (Yaylali, Butcher, Sinclair, Eq. 24, to a finite horizon S).
 
     For α < 1 and an initial displacement the tail υ ~ s^(-α) makes U grow without bound with S: compare only values

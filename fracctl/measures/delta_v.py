@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from fracctl.arrays import Booleans, Floats, finite
 from fracctl.errors import ArgumentError
+from fracctl.measures.base import check_kind
 from fracctl.stepwise import StepwiseTrajectory
 
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(5)
@@ -33,7 +34,9 @@ def delta_v(trajectory: StepwiseTrajectory, start: ArrayLike = 0.0, stop: ArrayL
 
     Raises:
         ArgumentError: an interval does not lie in [0, horizon].
+        UnsupportedError: the trajectory is another.
     """
+    check_kind("delta_v", "StepwiseTrajectory", trajectory)
     first, last = finite("start", start), finite("stop", trajectory.horizon if stop is None else stop)
     for name, value in (("start", first), ("stop", last)):
         if value.size and not (value.min() >= 0.0 and value.max() <= trajectory.horizon * (1.0 + 1e-12)):

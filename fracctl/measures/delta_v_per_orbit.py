@@ -9,12 +9,13 @@ from numpy.typing import ArrayLike
 
 from fracctl.arrays import Floats
 from fracctl.errors import ArgumentError, UnsupportedError
+from fracctl.measures.base import OfTrajectories
 from fracctl.measures.delta_v import delta_v
 from fracctl.measures.periods import checked_period, periods
 from fracctl.stepwise import StepwiseTrajectory
 
 
-class DeltaVPerOrbit:
+class DeltaVPerOrbit(OfTrajectories):
     """(1/n) ∫ |u| dt over the first n controlled orbits, from switch-on t₀ to t₀ + n τ; the free orbit does not count.
 
     Where a run is shorter, or ended before, the mean is over what it flew under control; 0 where it flew free. The

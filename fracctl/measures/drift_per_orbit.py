@@ -9,11 +9,12 @@ from numpy.typing import ArrayLike
 
 from fracctl.arrays import Floats
 from fracctl.errors import ArgumentError, UnsupportedError
+from fracctl.measures.base import OfTrajectories
 from fracctl.measures.periods import checked_period, differences, n_positions, periods, plant_period
 from fracctl.stepwise import StepwiseTrajectory
 
 
-class DriftPerOrbit:
+class DriftPerOrbit(OfTrajectories):
     """|ξ(kT) - ξ((k-1)T)| for the last whole number k of periods, the change of position at equal phase.
 
     The positions are the first half of the state (the whole state of plants that are no `SecondOrder`). For motion

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from fracctl.arrays import Floats
+from fracctl.measures.base import OfTrajectories
 from fracctl.measures.periods import periods
 from fracctl.stepwise import StepwiseTrajectory
 
 
-class FinalDelay:
+class FinalDelay(OfTrajectories):
     """τ at the end of each run."""
 
     name = "final_delay"

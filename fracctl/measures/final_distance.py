@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from fracctl.arrays import Floats
+from fracctl.measures.base import OfTrajectories
 from fracctl.trajectory import Trajectory
 
 
-class FinalDistance:
+class FinalDistance(OfTrajectories):
     """max_i |ξ_i(S)| at the horizon S; tells trajectories that do not settle apart. +inf where there is none."""
 
     name = "final_distance"

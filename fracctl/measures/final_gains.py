@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from fracctl.arrays import Floats
+from fracctl.measures.base import OfTrajectories
 from fracctl.meshwise import MeshTrajectory
 
 
-class FinalGains:
+class FinalGains(OfTrajectories):
     """ϑ₁ and ϑ₂ at a member's end; NaN for laws that do not adapt."""
 
     name = "final_gains"

@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from fracctl.arrays import Floats
+from fracctl.measures.base import OfTrajectories
 from fracctl.measures.tethers import tether_of, travel
 from fracctl.meshwise import MeshTrajectory
 
 
-class FirstReversal:
+class FirstReversal(OfTrajectories):
     """The first f/2π at which the rate of the length turns against its way: λ' < 0 in a deployment.
 
     Between the times of the mesh rates are straight lines. +inf where the rate never turns before the member's end,

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from fracctl.arrays import Floats
+from fracctl.measures.base import OfTrajectories
 from fracctl.meshwise import MeshTrajectory
 
 
-class ImplicitSteps:
+class ImplicitSteps(OfTrajectories):
     """How many steps Newton's method did not solve: by bracketing instead, and not at all."""
 
     name = "implicit_steps"

@@ -11,6 +11,7 @@ import numpy as np
 
 from fracctl.arrays import Floats
 from fracctl.errors import ArgumentError
+from fracctl.measures.base import OfTrajectories
 from fracctl.plants.linear import LinearPlant
 from fracctl.plants.state import StatePlant
 from fracctl.units import Scales, Spacecraft
@@ -18,7 +19,7 @@ from fracctl.units import Scales, Spacecraft
 Told = TypeVar("Told", bound="InUnits")
 
 
-class InUnits:
+class InUnits(OfTrajectories):
     """A measure that needs units; `for_flight` gives them to it."""
 
     name: str

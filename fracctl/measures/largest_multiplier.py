@@ -10,13 +10,14 @@ import numpy as np
 from fracctl.arrays import Complexes, Floats
 from fracctl.controllers.delayed_feedback import DelayedTerm, GainFunction
 from fracctl.errors import ArgumentError
+from fracctl.measures.base import OfTrajectories
 from fracctl.measures.periods import periods
 from fracctl.stability.floquet import FEWEST_NODES, Neighbourhood, nontrivial_multipliers, real_above_one
 from fracctl.stability.periodic_orbits import shoot
 from fracctl.stepwise import StepwiseTrajectory
 
 
-class LargestMultiplier:
+class LargestMultiplier(OfTrajectories):
     """max |μ| over the non-trivial multipliers of the target orbit under the control of a run; below 1 it is stable.
 
     The target is the free orbit whose period is the last delay, found by shooting from a guess. NaN where there is

@@ -6,11 +6,12 @@ import numpy as np
 
 from fracctl.arrays import Floats
 from fracctl.errors import ArgumentError
+from fracctl.measures.base import OfTrajectories
 from fracctl.measures.tethers import tether_of, travel
 from fracctl.meshwise import MeshTrajectory
 
 
-class LateDeviation:
+class LateDeviation(OfTrajectories):
     """The largest |λ - λ_d| from a time on, at the times of the mesh; +inf where the member ended before the horizon.
 
     Args:

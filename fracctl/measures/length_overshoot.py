@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from fracctl.arrays import Floats
+from fracctl.measures.base import OfTrajectories
 from fracctl.measures.mesh_cubics import cubics
 from fracctl.measures.tethers import tether_of, travel
 from fracctl.meshwise import MeshTrajectory
 
 
-class LengthOvershoot:
+class LengthOvershoot(OfTrajectories):
     """The largest excursion of the length past its target, in percent of the way there; 0 if there is none.
 
     The target is what the reference goes to in the end. For station-keeping, which starts at the target, the largest

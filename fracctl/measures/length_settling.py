@@ -8,12 +8,13 @@ import numpy as np
 
 from fracctl.arrays import Floats
 from fracctl.errors import ArgumentError
+from fracctl.measures.base import OfTrajectories
 from fracctl.measures.mesh_cubics import cubics
 from fracctl.measures.tethers import tether_of, travel
 from fracctl.meshwise import MeshTrajectory
 
 
-class LengthSettling:
+class LengthSettling(OfTrajectories):
     """When the length of a tether enters bands about its target for good.
 
     A band of p percent is |λ - λ_d| ≤ p/100 · span, where λ_d is what the reference goes to in the end and the span

@@ -6,11 +6,12 @@ import numpy as np
 
 from fracctl.arrays import Floats
 from fracctl.errors import ArgumentError
+from fracctl.measures.base import OfTrajectories
 from fracctl.stability.lyapunov import largest_exponent
 from fracctl.stepwise import StepwiseTrajectory
 
 
-class LyapunovExponent:
+class LyapunovExponent(OfTrajectories):
     """The largest Lyapunov exponent of the plant without control, from the initial state of each run, per unit of time.
 
     `fracctl.stability.largest_exponent` over so many periods 2π after a transient; above 0 the motion is chaotic. It

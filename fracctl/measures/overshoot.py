@@ -7,13 +7,14 @@ import numpy as np
 from fracctl.arrays import Floats
 from fracctl.errors import ArgumentError
 from fracctl.features import largest_excursion
+from fracctl.measures.base import OfTrajectories
 from fracctl.measures.samples import samples_of
 from fracctl.trajectory import Trajectory
 
 DEFINITIONS = ("past_equilibrium", "largest_extremum")
 
 
-class Overshoot:
+class Overshoot(OfTrajectories):
     """σ = 1 + c x̂, the mean over the components (Yaylali, Butcher, Sinclair, section "Numerical survey").
 
     Args:

@@ -6,10 +6,11 @@ import numpy as np
 
 from fracctl.arrays import Floats
 from fracctl.features import largest_excursion
+from fracctl.measures.base import OfTrajectories
 from fracctl.trajectory import Trajectory
 
 
-class PeakAcceleration:
+class PeakAcceleration(OfTrajectories):
     """max_i sup_{0 < s ≤ S} |υ_i(s)|, by component, as thrusters along the axes give it; υ(0+) counts.
 
     Times the acceleration scale r n² of the plant it is a thrust acceleration. Exact on the interpolant; +inf where

@@ -6,11 +6,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fracctl.arrays import Floats
+from fracctl.measures.base import OfTrajectories
 from fracctl.measures.periods import SAMPLES, checked_period, differences, periods
 from fracctl.stepwise import StepwiseTrajectory
 
 
-class PeriodicityError:
+class PeriodicityError(OfTrajectories):
     """max |x(t) - x(t - τ)| over the last period, t in [S - τ, S], with the Euclidean norm of the whole state.
 
     S is the horizon, or the end of a member that ended before. Dimensionless. The largest of 129 samples, which falls

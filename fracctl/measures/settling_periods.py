@@ -7,11 +7,12 @@ from numpy.typing import ArrayLike
 
 from fracctl.arrays import Floats
 from fracctl.errors import ArgumentError
+from fracctl.measures.base import OfTrajectories
 from fracctl.measures.periods import SAMPLES, checked_period, differences, periods
 from fracctl.stepwise import StepwiseTrajectory
 
 
-class SettlingPeriods:
+class SettlingPeriods(OfTrajectories):
     """The first whole number k for which |x(t) - x(t - τ)| stays below a threshold for all t ≥ k τ.
 
     128 samples a period; at least 1, for there is nothing to compare the first period with. +inf where the last period

@@ -7,10 +7,11 @@ import numpy as np
 from fracctl.arrays import Array, Booleans, Floats
 from fracctl.errors import ArgumentError
 from fracctl.features import last_crossing, value_at
+from fracctl.measures.base import OfTrajectories
 from fracctl.trajectory import Trajectory
 
 
-class SettlingTime:
+class SettlingTime(OfTrajectories):
     """The last crossing of |ξ_i| = δ, the largest over the components; +inf if outside the band at the horizon.
 
     Args:

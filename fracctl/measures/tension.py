@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from fracctl.arrays import Floats
+from fracctl.measures.base import OfTrajectories
 from fracctl.measures.mesh_lines import begin_of, controls, lines
 from fracctl.measures.tethers import tether_of
 from fracctl.meshwise import MeshTrajectory
 
 
-class Tension:
+class Tension(OfTrajectories):
     """Least and largest tension T̂ = ρ - τ_t up to a member's end.
 
     ``tension_min`` and ``tension_max`` are over m̄ ḟ² L, those with ``_n`` in newton. ``saturated_percent`` is the

@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from fracctl.arrays import Floats
+from fracctl.measures.base import OfTrajectories
 from fracctl.measures.mesh_lines import begin_of, lines
 from fracctl.measures.tethers import tether_of
 from fracctl.meshwise import MeshTrajectory
 
 
-class ThrusterForce:
+class ThrusterForce(OfTrajectories):
     """The larger of |τ_θ|/(λ cos φ) and |τ_φ|/λ, at its largest up to a member's end.
 
     Over m̄ ḟ² L, and in newton. On a tether that is still short the torques of a law for the deployed one take a great

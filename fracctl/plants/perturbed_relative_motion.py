@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fracctl.arrays import Floats, finite
+from fracctl.arrays import Array, Floats, finite
 from fracctl.compiling import compiled_with
 from fracctl.elements import Elements
 from fracctl.errors import ArgumentError
@@ -17,7 +17,7 @@ from fracctl.plants.function import FunctionPlant
 from fracctl.plants.hcw import Chief
 from fracctl.plants.leader_orbit import LeaderOrbit
 from fracctl.plants.relative_motion import checked_phase
-from fracctl.plants.state import SecondOrder
+from fracctl.plants.state import SecondOrder, of_rows
 from fracctl.units import EARTH_RADIUS_KM
 
 EARTH_J2 = 1.08262668e-3
@@ -128,13 +128,26 @@ class PerturbedRelativeMotion(SecondOrder):
         other._constants[:, 2] = self._drag * given
         return other
 
+    @property
+    def batch(self) -> int | None:
+        """Batch size, None where all members share the followers' coefficient."""
+        return len(self._constants) if len(self._constants) > 1 else None
+
+    def take(self, rows: Array) -> PerturbedRelativeMotion:
+        """Return the plant of some members."""
+        if self.batch is None:
+            return self
+        other = copy.copy(self)
+        other._constants = self._constants[rows]
+        return other
+
     def leader_motion(self, t: Floats) -> Floats:
         """Return r, r', h and the polar axis in the leader's frame at times (b,) from 0 on, (b, 6)."""
         return self._orbit(t)
 
     def rates(self, t: Floats, x: Floats, u: Floats) -> Floats:
         """Return x' of x = [x, y, z, x', y', z'], (b, 6)."""
-        return _rates(self._orbit(t), x, u, self._constants)
+        return _rates(self._orbit(t), x, u, of_rows(self._constants, len(x)))
 
     def jacobians(self, t: Floats, x: Floats, u: Floats) -> tuple[Floats, Floats]:
         """Return ∂f/∂x, (b, 6, 6), and ∂f/∂u, (b, 6, 3), by differences of fourth order."""
@@ -145,7 +158,7 @@ class PerturbedRelativeMotion(SecondOrder):
 def _rates(leader: Floats, x: Floats, u: Floats, constants: Floats) -> Floats:
     out = np.empty_like(x)
     for i in range(len(x)):
-        k, drag_leader, drag, height = constants[min(i, len(constants) - 1)]
+        k, drag_leader, drag, height = constants[i]
         r, climb, h, px, py, pz = leader[i]
         bx, by, bz, vx, vy, vz = x[i]
         oblate = 3.0 * k / r**4

@@ -9,12 +9,12 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fracctl.arrays import Floats, finite
+from fracctl.arrays import Array, Floats, finite
 from fracctl.compiling import compiled_with
 from fracctl.elements import Elements
 from fracctl.errors import ArgumentError
 from fracctl.plants.hcw import Chief
-from fracctl.plants.state import SecondOrder
+from fracctl.plants.state import SecondOrder, of_rows
 
 
 class AboutKeplerOrbit(SecondOrder):
@@ -47,8 +47,25 @@ class AboutKeplerOrbit(SecondOrder):
         return self.leader.elements(self.eccentricity, self.true_anomaly_deg)
 
     def leader_motion(self, t: Floats) -> Floats:
-        """Return r, ω and ω' at times (b,), (b, 3)."""
-        return kepler_motion(t + self._mean_anomaly, np.repeat(self._e, len(t) // len(self._e)))
+        """Return r, ω and ω' at times (b,), (b, 3).
+
+        Raises:
+            ArgumentError: the times are not as many as leaders.
+        """
+        return kepler_motion(t + of_rows(self._mean_anomaly, len(t)), of_rows(self._e, len(t)))
+
+    @property
+    def batch(self) -> int | None:
+        """Batch size, None where all members share the leader."""
+        return len(self._e) if len(self._e) > 1 else None
+
+    def take(self, rows: Array) -> Self:
+        """Return the plant of some members."""
+        if self.batch is None:
+            return self
+        other = copy.copy(self)
+        other._e, other._mean_anomaly = self._e[rows], self._mean_anomaly[rows]
+        return other
 
     def dispersed_by(self, eccentricity: ArrayLike | None = None, true_anomaly_deg: ArrayLike | None = None) -> Self:
         """Return the plant of b members, each about a leader of its own; what is not given is as it was.

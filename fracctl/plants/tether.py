@@ -9,10 +9,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fracctl.arrays import Floats, batch_size, finite
+from fracctl.arrays import Array, Floats, batch_size, finite
 from fracctl.compiling import ACCELERATION, compiled_with, pointer_with
 from fracctl.errors import ArgumentError
-from fracctl.plants.state import Event, SecondOrder
+from fracctl.plants.state import Event, SecondOrder, of_rows
 from fracctl.units import EARTH_GRAVITATIONAL_PARAMETER_KM3_S2
 
 EARTH_RADIUS_KM = 6378.137
@@ -51,7 +51,8 @@ class Tether(SecondOrder):
     These units vary along the orbit and two of the three positions are angles, so that there are no `scales`: metres
     are `length_m` λ, and `tension_n`, `torques_n_m`, `thruster_force_n` and `orbits` give the rest. The event
     ``collision`` is the tether's length falling to `shortest`: the two satellites meet, past it the equations mean
-    nothing; ``escaped`` is its growing to `longest`, more than there is.
+    nothing; ``escaped`` is its growing to `longest`, more than there is; ``slack`` a tension below zero, which no loop
+    within the bounds comes to.
 
     Args:
         eccentricity: e in [0, 1).
@@ -59,7 +60,8 @@ class Tether(SecondOrder):
         length_m: L, for units alone.
         mother_mass_kg: m₁, for units alone.
         subsatellite_mass_kg: m₂, for units alone.
-        tension: bounds of the tension ρ - τ_t; ρ is their mean.
+        tension: bounds of the tension ρ - τ_t; ρ is their mean. They and `torque` hold in every `ClosedLoop` that is
+            not given a saturation of its own.
         torque: bound of |τ_θ| and |τ_φ|.
         disturbance: amplitudes d of the three rows, (3,) or (b, 3).
         disturbance_phase: in radians, () or (b,).
@@ -128,6 +130,12 @@ class Tether(SecondOrder):
         )
 
     @property
+    def control_events(self) -> tuple[Event, ...]:
+        """A tension below zero."""
+        meaning = "the tension fell below zero, where a tether is slack and the equations end"
+        return (Event("slack", lambda _, u: self.rho - u[:, 0], meaning=meaning),)
+
+    @property
     def orbital_period_s(self) -> float:
         """Time from perigee to perigee."""
         axis = self.perigee_km / (1.0 - self.eccentricity)
@@ -181,16 +189,26 @@ class Tether(SecondOrder):
         other._parameters = _parameters(float(e[0]), float(rho[0]), amplitudes, own_phase + phase.ravel())
         return other
 
+    @property
+    def batch(self) -> int | None:
+        """Batch size, None where all members share the disturbances."""
+        return len(self._parameters) if len(self._parameters) > 1 else None
+
+    def take(self, rows: Array) -> Tether:
+        """Return the plant of some members."""
+        if self.batch is None:
+            return self
+        other = copy.copy(self)
+        other._parameters = self._parameters[rows]
+        return other
+
     def kernel_parameters(self, batch: int) -> Floats:
         """Return the parameters of `acceleration` for each member of a batch, [e, ρ, d, phase], (b, 6).
 
         Raises:
             ArgumentError: the disturbances are those of another number of members.
         """
-        if len(self._parameters) not in (1, batch):
-            allowed = f"must have the batch size of the disturbances, {len(self._parameters)}"
-            raise ArgumentError("x", f"a batch of {batch}", allowed)
-        return np.repeat(self._parameters, batch // len(self._parameters), axis=0)
+        return of_rows(self._parameters, batch)
 
     def rates(self, t: Floats, x: Floats, u: Floats) -> Floats:
         """Return x' of x = [λ, θ, φ, λ', θ', φ'], (b, 6)."""

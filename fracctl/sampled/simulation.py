@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from fracctl.arrays import Booleans, Floats, finite
 from fracctl.errors import ArgumentError
-from fracctl.plants.state import StatePlant
+from fracctl.plants.state import StatePlant, batch_of
 from fracctl.sampled.actuator import Actuator
 from fracctl.sampled.controller import DiscreteController
 from fracctl.sampled.law import SampledLaw
@@ -101,7 +101,7 @@ def simulate(
         np.ascontiguousarray(np.swapaxes(commands, 0, 1)),
         limits / count,
         np.where(np.isfinite(x).all(axis=1), "ok", "diverged").astype(object),
-        np.ndim(initial_state) == 2,
+        np.ndim(initial_state) == 2 or batch_of(plant) is not None,
     )
 
 
@@ -138,11 +138,14 @@ def _kept(
 
 def _states(plant: StatePlant, initial_state: ArrayLike) -> Floats:
     start = finite("initial_state", initial_state)
-    n = plant.n_states
+    n, own = plant.n_states, batch_of(plant)
     if start.ndim not in (1, 2) or start.shape[-1] != n or n != 2 * plant.n_controls:
         allowed = f"must have shape ({n},) or (b, {n}), positions and as many velocities"
         raise ArgumentError("initial_state", f"of shape {start.shape}", allowed)
-    return np.ascontiguousarray(np.atleast_2d(start))
+    if own is not None and start.ndim == 2 and len(start) != own:
+        allowed = f"must have the batch size of the plant, {own}"
+        raise ArgumentError("initial_state", f"a batch of {len(start)}", allowed)
+    return np.array(np.broadcast_to(start, (own or len(np.atleast_2d(start)), n)))
 
 
 def _recorded(earlier: ArrayLike, batch: int, width: int) -> Floats:

@@ -22,7 +22,7 @@ from fracctl.errors import ArgumentError, UnsupportedError
 from fracctl.loop import ClosedLoop, Need
 from fracctl.panels import Panel, PanelGrid
 from fracctl.plants.linear import LinearPlant
-from fracctl.plants.state import StatePlant
+from fracctl.plants.state import StatePlant, members_of
 from fracctl.solvers.base import Survey
 from fracctl.solvers.explicit_memory_law import highest_used, signals
 from fracctl.solvers.explicit_memory_mesh import step_edges
@@ -142,7 +142,7 @@ class ExplicitMemory:
             everyone = np.tile(rows, k)
             limit = None if loop.saturation is None else loop.saturation.take(everyone)
             states = start[:, rows].reshape(k * len(rows), n)
-            problem = Problem(loop.plant, law.take(everyone), limit, states, horizon)
+            problem = Problem(members_of(loop.plant, everyone), law.take(everyone), limit, states, horizon)
             for part in self._solved(problem, k):
                 yield _packed(part, rows, stable, k, self.tolerance)
 
@@ -196,26 +196,27 @@ def _packed(part: _Part, rows: Array, stable: Array, k: int, tolerance: float) -
     status[ended & (status != "failed")] = solved.ended[1][ended & (status != "failed")]
     status[~solved.complete] = np.where(_has_grown(solved), "diverged", "failed")[~solved.complete]
     shown = solved.alive & solved.complete[:, None]
+    end = np.where(solved.complete, np.minimum(solved.ended[0], solved.problem.horizon), 0.0)
 
     def at_nodes(values: Floats) -> Floats:
         return np.where(shown[:, None, :, None], values, np.nan).reshape(b, values.shape[1], len(solved.grid.times))
 
-    return Survey(
-        rows[part.rows],
-        Trajectory(
-            grid=solved.grid,
-            initial_state=solved.problem.start,
-            positions=at_nodes(solved.values[:, :m]),
-            controls_at_nodes=at_nodes(solved.controls),
-            initial_controls=np.ascontiguousarray(solved.controls[:, :, 0, 0]),
-            rates=at_nodes(solved.values[:, m : 2 * m]),
-            auxiliary=at_nodes(solved.values[:, 2 * m :]),
-            status=status,
-            stable=verdict,
-            error_estimate=np.where(np.isfinite(part.error), part.error, np.nan),
-            counters={"nodes": part.nodes},
-        ),
+    trajectory = Trajectory(
+        grid=solved.grid,
+        initial_state=solved.problem.start,
+        positions=at_nodes(solved.values[:, :m]),
+        controls_at_nodes=at_nodes(solved.controls),
+        initial_controls=np.ascontiguousarray(solved.controls[:, :, 0, 0]),
+        rates=at_nodes(solved.values[:, m : 2 * m]),
+        auxiliary=at_nodes(solved.values[:, 2 * m :]),
+        end=end,
+        events={name: np.where(times <= end, times, np.nan) for name, times in solved.events.items()},
+        status=status,
+        stable=verdict,
+        error_estimate=np.where(np.isfinite(part.error), part.error, np.nan),
+        counters={"nodes": part.nodes},
     )
+    return Survey(rows[part.rows], trajectory)
 
 
 def _has_grown(solved: Run) -> Booleans:
@@ -253,7 +254,8 @@ def _is_second_order(plant: LinearPlant | StatePlant) -> bool:
     if n != 2 * m:
         return False
     probe = np.linspace(0.1, 0.9, n)[None]
-    rates: Booleans = plant.rates(np.zeros(1), probe, np.zeros((1, m)))[:, :m] == probe[:, m:]
+    one = members_of(plant, np.zeros(1, dtype=np.intp))
+    rates: Booleans = one.rates(np.zeros(1), probe, np.zeros((1, m)))[:, :m] == probe[:, m:]
     return bool(rates.all())
 
 

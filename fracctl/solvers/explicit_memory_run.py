@@ -11,7 +11,7 @@ from fracctl.arrays import Array, Booleans, Floats
 from fracctl.controllers.saturation import Saturation
 from fracctl.fractional.collocation import chebyshev_nodes, integral_matrix
 from fracctl.panels import Panel, PanelGrid
-from fracctl.plants.state import Event, StatePlant
+from fracctl.plants.state import Event, StatePlant, control_events, members_of
 from fracctl.solvers.explicit_memory_history import History
 from fracctl.solvers.explicit_memory_law import Signals
 from fracctl.solvers.explicit_memory_mesh import crossings
@@ -36,7 +36,8 @@ class Problem:
     def take(self, rows: Array) -> Problem:
         """Return some of the members."""
         limit = None if self.saturation is None else self.saturation.take(rows)
-        return replace(self, signals=self.signals.take(rows), saturation=limit, start=self.start[rows])
+        plant = members_of(self.plant, rows)
+        return replace(self, plant=plant, signals=self.signals.take(rows), saturation=limit, start=self.start[rows])
 
     @property
     def has_powers(self) -> bool:
@@ -51,7 +52,8 @@ class Problem:
             control = self.saturation(control)
         flat = np.ascontiguousarray(control).reshape(b * k, m)
         states = np.ascontiguousarray(x.transpose(1, 2, 0)).reshape(b * k, 2 * m)
-        rates = self.plant.rates(np.tile(t, b), states, flat)
+        plant = self.plant if k == 1 else members_of(self.plant, np.repeat(np.arange(b), k))
+        rates = plant.rates(np.tile(t, b), states, flat)
         return rates[:, m:].reshape(b, k, m).transpose(2, 0, 1), control.transpose(2, 0, 1)
 
 
@@ -97,22 +99,30 @@ class Run:
         return np.concatenate([ends, times[times < end[members]]])
 
     @cached_property
+    def events(self) -> dict[str, Floats]:
+        """First time of each event, infinite where it does not happen, each (b,); not cut off where members end."""
+        plant, states = self.problem.plant, self.values[:, : 2 * self.problem.signals.n_positions]
+        of_states = {event.name: self._first(event, states) for event in plant.events}
+        return of_states | {event.name: self._first(event, self.controls) for event in control_events(plant)}
+
+    def _first(self, event: Event, values: Floats) -> Floats:
+        """Return when an event of states or controls at the nodes (b, n, P, K) happens first, (b,)."""
+        b, n = values.shape[:2]
+        first = np.where(event.function(np.zeros(b), values[:, :, 0, 0]) < 0.0, 0.0, np.inf)
+        flat = np.moveaxis(values, 1, -1).reshape(-1, n)
+        signs = event.function(np.tile(self.grid.times, b), flat).reshape(b, 1, *values.shape[2:])
+        members, found = crossings(values, self.edges, partial(_of_nodes, event), signs)
+        np.minimum.at(first, members, found)
+        return first
+
+    @cached_property
     def ended(self) -> tuple[Floats, Array]:
         """When members end, (b,), infinite for those that do not, and by which event, (b,) words or None."""
-        b, m = len(self.values), self.problem.signals.n_positions
-        end, names = np.full(b, np.inf), np.full(b, None, dtype=object)
-        times = self.grid.times
-        for event in self.problem.plant.events:
-            if not event.terminal:
-                continue
-            at_once = event.function(np.zeros(b), self.problem.start[:, : 2 * m]) < 0.0
-            end[at_once], names[at_once] = 0.0, event.name
-            flat = np.moveaxis(self.values[:, : 2 * m], 1, -1).reshape(-1, 2 * m)
-            signs = event.function(np.tile(times, b), flat).reshape(b, 1, *self.values.shape[2:])
-            members, found = crossings(self.values, self.edges, partial(_of_states, event, 2 * m), signs)
-            for member, time in zip(members, found, strict=True):
-                if time < end[member]:
-                    end[member], names[member] = time, event.name
+        end, names = np.full(len(self.values), np.inf), np.full(len(self.values), None, dtype=object)
+        for event in (*self.problem.plant.events, *control_events(self.problem.plant)):
+            earlier = self.events[event.name] < end
+            if event.terminal:
+                end[earlier], names[earlier] = self.events[event.name][earlier], event.name
         return end, names
 
     @cached_property
@@ -154,9 +164,9 @@ class Run:
         return found
 
 
-def _of_states(event: Event, n_states: int, members: Array, times: Floats, values: Floats) -> Floats:
+def _of_nodes(event: Event, members: Array, times: Floats, values: Floats) -> Floats:
     del members
-    return event.function(times, values[:, :n_states])[:, None]
+    return event.function(times, values)[:, None]
 
 
 def run(problem: Problem, edges: Floats, nodes: int, tolerance: float) -> Run:

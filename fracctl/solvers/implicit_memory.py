@@ -16,6 +16,7 @@ from fracctl.fractional.sum_of_exponentials import sum_of_exponentials
 from fracctl.loop import ClosedLoop
 from fracctl.meshwise import MeshTrajectory
 from fracctl.plants.state import Event, StatePlant
+from fracctl.solvers.control_events import ended_by_controls
 from fracctl.solvers.implicit_memory_equations import Given
 from fracctl.solvers.implicit_memory_kernel import BRACKETED, UNRESOLVED, Path, march, room_for
 from fracctl.solvers.members import positive, starting_states
@@ -127,7 +128,7 @@ class ImplicitMemory:
             status[~(error <= self.tolerance)] = "failed"
         status[(fine.steps < len(fine.times) - 1) & (ended == "")] = "diverged"
         assert isinstance(loop.controller, MemoryLaw)
-        return MeshTrajectory(
+        trajectory = MeshTrajectory(
             plant=loop.plant,
             law=loop.controller,
             times=fine.times,
@@ -149,6 +150,7 @@ class ImplicitMemory:
             },
             batched=batched,
         )
+        return ended_by_controls(loop.plant, trajectory)
 
 
 def graded_mesh(first: float, largest: float, horizon: float, longer: tuple[Floats, Floats] | None = None) -> Floats:
@@ -227,11 +229,7 @@ class _Problem:
         self.tolerance = memory_tolerance
         batch, m = len(start), loop.plant.n_controls
         self.limits = np.empty((batch, 2, m))
-        if loop.saturation is None:
-            bound: Floats = np.full((1, 1), np.inf)
-        else:
-            bound = loop.saturation.limit.reshape(1, 1) if loop.saturation.limit.ndim == 0 else loop.saturation.limit
-            bound = bound.reshape(len(bound), -1)
+        bound = np.full((1, 1), np.inf) if loop.saturation is None else loop.saturation.limit
         self.limits[:, 1] = bound
         self.limits[:, 0] = -bound
 

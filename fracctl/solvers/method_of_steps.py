@@ -12,6 +12,8 @@ from fracctl.controllers.adaptive_delay import AdaptiveDelayedFeedback
 from fracctl.controllers.delayed_feedback import DelayedLaw, DelayedTerm
 from fracctl.errors import ArgumentError, UnsupportedError
 from fracctl.loop import ClosedLoop, Need
+from fracctl.plants.state import members_of
+from fracctl.solvers.control_events import ended_by_controls
 from fracctl.solvers.members import positive, starting_states, whole
 from fracctl.solvers.method_of_steps_adaptive import AdaptiveRun
 from fracctl.solvers.method_of_steps_events import Watch
@@ -108,7 +110,7 @@ class MethodOfSteps:
             steps, error = problem.refined(steps, watch, error, min(self.tolerance or _GOAL, _GOAL))
             problem.withdraw_doubtful(steps, watch, error)
         end = watch.end
-        return StepwiseTrajectory(
+        trajectory = StepwiseTrajectory(
             plant=loop.plant,
             steps=steps,
             terms=terms,
@@ -121,6 +123,7 @@ class MethodOfSteps:
             counters={"steps": np.array([np.searchsorted(e, last) for e, last in zip(steps.edges, end, strict=True)])},
             batched=batched,
         )
+        return ended_by_controls(loop.plant, trajectory)
 
 
 class _Problem:
@@ -176,15 +179,16 @@ class _Problem:
     def _on_own_steps(self, members: Array, most: int) -> tuple[Steps, Watch, Floats]:
         """Return states, what ended members, and estimated errors of some members on steps of their own."""
         terms, start, b = of_members(self.terms, members), self.start[members], len(self.start)
+        plant = members_of(self.plant, members)
         history = self.history and for_members(self.history, members, b, start.shape[1:])
         breaks = [breaks_of(terms, self.breaks, i, self.horizon) for i in range(len(members))]
         shortest = np.min([term.delay for term in terms], axis=0) if terms else np.full(len(members), 2.0 * np.pi)
         latest = np.full(len(members), self.horizon)
         first = Watch(self.plant.events, latest)
-        rough = pilot(self.plant, terms, history, breaks, shortest / (self.count // 2), start, most, first)
+        rough = pilot(plant, terms, history, breaks, shortest / (self.count // 2), start, most, first)
         first.look_at_rest(rough)
         watch = Watch(self.plant.events, np.where(first.diverged(self.horizon), first.end, latest))
-        steps = run(self.plant, terms, None, history, halved(rough.edges), start, watch)
+        steps = run(plant, terms, None, history, halved(rough.edges), start, watch)
         watch.look_at_rest(steps)
         return steps, watch, _difference(steps, rough, watch.end, self.horizon) / _SAFE_RATIO
 

@@ -108,7 +108,7 @@ def test_disturbances_are_sines_of_their_own_phase() -> None:
     np.testing.assert_allclose(plant.rates(t, x, u), calm.rates(t, x, u + added), rtol=1e-13)
     np.testing.assert_array_equal(plant.kernel_parameters(2)[:, 1], 2.55)
     assert Tether(disturbance_phase=[0.0, 0.1]).kernel_parameters(2).shape == (2, 6)
-    with pytest.raises(ArgumentError, match="`x` must have the batch size of the disturbances, 2, but is a batch of 3"):
+    with pytest.raises(ArgumentError, match="`x` must have a row for each member of the plant, 2, but is a batch of 3"):
         plant.kernel_parameters(3)
 
 

@@ -310,6 +310,45 @@ def test_an_event_ends_the_members_that_meet_it() -> None:
     assert np.isnan(found([last + 1e-3])[0]).all()
     assert found.missing.tolist() == [True, False, True]
     assert (found.error_estimate[:2] <= 1e-8).all()
+    assert found.end[:2] == pytest.approx([time, 20.0], abs=1e-7)
+    assert found.end[2] == 0.0
+    np.testing.assert_array_equal(found.events["hit"], [found.end[0], np.nan, 0.0])
+    assert np.isnan(found([found.end[0] + 1e-6])[0]).all()
+
+
+def test_events_that_end_nothing_are_recorded_up_to_the_end() -> None:
+    """Against an integrator; `late` comes after the end of the first member, and before time 0 of none."""
+
+    def plant(words: str) -> FunctionPlant:
+        events = {
+            "hit": Event("hit", lambda t, x: x[:, 0] + 0.5),
+            "passed": Event("passed", lambda t, x: x[:, 0] - 0.3, terminal=False),
+            "late": Event("late", lambda t, x: 6.0 - t, terminal=False),
+        }
+        chosen = [events[word] for word in words.split()]
+        return FunctionPlant(
+            lambda t, x, u: np.stack([x[:, 1], -np.sin(x[:, 0]) + u[:, 0]], axis=1), 2, 1, events=chosen
+        )
+
+    start = np.array([[1.0, 0.0], [0.4, 0.0], [0.2, 0.0]])
+    found = ExplicitMemory().solve(ClosedLoop(plant("hit passed late"), PD(0.1, 0.05)), start, 8.0)
+    assert found.status.tolist() == ["hit", "ok", "ok"]
+    assert found.events["late"] == pytest.approx([np.nan, 6.0, 6.0], abs=1e-9, nan_ok=True)
+    exact = [
+        solve_ivp(
+            lambda t, x: [x[1], -np.sin(x[0]) - 0.1 * x[0] - 0.05 * x[1]],
+            (0.0, 8.0),
+            x0,
+            "DOP853",
+            events=lambda t, x: x[0] - 0.3,
+            rtol=1e-12,
+            atol=1e-12,
+        ).t_events[0][0]
+        for x0 in start[:2]
+    ]
+    assert found.events["passed"] == pytest.approx([*exact, 0.0], abs=1e-7)
+    alone = ExplicitMemory().solve(ClosedLoop(plant("hit"), PD(0.1, 0.05)), start, 8.0)
+    np.testing.assert_array_equal(found.positions, alone.positions, err_msg="recording changes nothing")
 
 
 def test_what_cannot_be_followed_is_never_silently_wrong() -> None:

@@ -313,7 +313,8 @@ def test_members_on_the_same_mesh_do_not_know_of_each_other() -> None:
     [
         (None, [[np.inf] * 2] * 2),
         (Saturation(0.7, "axis"), [[0.7, 0.7]] * 2),
-        (Saturation([0.7, 0.4], "axis"), [[0.7, 0.7], [0.4, 0.4]]),
+        (Saturation([[0.7], [0.4]], "axis"), [[0.7, 0.7], [0.4, 0.4]]),
+        (Saturation([0.7, 0.5], "axis"), [[0.7, 0.5]] * 2),
         (Saturation([[0.7, 0.5]], "axis"), [[0.7, 0.5]] * 2),
         (Saturation([[0.7, 0.5], [0.3, 0.4]], "axis"), [[0.7, 0.5], [0.3, 0.4]]),
     ],

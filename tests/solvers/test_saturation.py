@@ -12,7 +12,7 @@ from fracctl.controllers import DelayedFeedback, DelayedSum, PDAlpha, Saturation
 from fracctl.errors import ArgumentError, UnsupportedError
 from fracctl.loop import ClosedLoop
 from fracctl.measures import delta_v
-from fracctl.plants import FunctionPlant, HCWOutOfPlane, Libration, RotatingEllipsoid
+from fracctl.plants import FunctionPlant, HCWOutOfPlane, Libration, RelativeMotion, RotatingEllipsoid
 from fracctl.solvers import MethodOfSteps, solve
 from tests.solvers.test_method_of_steps import PAPER, rotation_gain
 
@@ -48,7 +48,8 @@ def one_delay_after_the_other(clip: Callable[[np.ndarray], np.ndarray]) -> tuple
 def test_limits_in_the_loop(by: str) -> None:
     """Two limits in one batch over five controlled orbits; 400 steps are far better than 100."""
     limits, horizon = np.array([0.002, 0.004]), (ORBITS + 1) * TAU
-    loop = ClosedLoop(RotatingEllipsoid(), DelayedFeedback(GAIN, TAU), Saturation(limits, by))
+    given = limits if by == "norm" else limits[:, None]
+    loop = ClosedLoop(RotatingEllipsoid(), DelayedFeedback(GAIN, TAU), Saturation(given, by))
     fine = MethodOfSteps(400).solve(loop, START, horizon)
     rough = MethodOfSteps(100).solve(loop, START, horizon)
     for i, limit in enumerate(limits):
@@ -105,10 +106,23 @@ def test_kinks_are_cut_out(limit: float, steps: int) -> None:
 
 def test_each_axis_can_have_its_own_limit() -> None:
     demand = np.array([[[3.0, -4.0], [0.1, 0.2]]])
-    np.testing.assert_array_equal(Saturation([[1.0, 2.0]], "axis")(demand), [[[1.0, -2.0], [0.1, 0.2]]])
+    for limit in ([1.0, 2.0], [[1.0, 2.0]]):
+        np.testing.assert_array_equal(Saturation(limit, "axis")(demand), [[[1.0, -2.0], [0.1, 0.2]]])
+        assert Saturation(limit, "axis").batch is None
+    members = Saturation([[1.0], [2.0]], "axis")
+    np.testing.assert_array_equal(members(np.repeat(demand, 2, axis=0))[:, 0], [[1.0, -1.0], [2.0, -2.0]])
+    assert members.batch == 2
+    np.testing.assert_array_equal(members.take(np.array([1]))(demand)[0, 0], [2.0, -2.0])
     np.testing.assert_allclose(Saturation(1.0)(demand), [[[0.6, -0.8], [0.1, 0.2]]], rtol=1e-15)
-    assert Saturation([[1.0, 2.0]], "axis").batch is None
     assert Saturation([1.0, 2.0]).batch == 2
+
+
+def test_limits_by_axis_of_one_loop_are_no_batch() -> None:
+    law = PDAlpha(np.eye(3), np.eye(3), 0.9)
+    loop = ClosedLoop(RelativeMotion(), law, Saturation([1e-3, 2e-3, 3e-3], "axis"))
+    assert loop.batch is None
+    trajectory = solve(loop, [0.1, 0.2, 0.3, 0.0, 0.0, 0.0], 0.5, "explicit_memory")
+    np.testing.assert_allclose(np.abs(trajectory.control([0.1])), [[1e-3, 2e-3, 3e-3]])
 
 
 @pytest.mark.parametrize(
@@ -119,11 +133,15 @@ def test_each_axis_can_have_its_own_limit() -> None:
         (lambda: Saturation([[1.0, 1.0]]), r"`limit` must have shape \(\) or \(b,\), but is of shape \(1, 2\)"),
         (
             lambda: ClosedLoop(Libration(), None, Saturation([[1.0, 2.0]], "axis")),
-            r"`limit` must have shape \(\), \(b,\), \(1, 1\) or \(b, 1\) for this plant",
+            r"`limit` must have shape \(\) or \(b, 1\) for this plant, but is of shape \(1, 2\)",
+        ),
+        (
+            lambda: ClosedLoop(RotatingEllipsoid(), None, Saturation([1.0, 2.0, 3.0], "axis")),
+            r"`limit` must have shape \(\), \(2,\), \(b, 1\) or \(b, 2\) for this plant, but is of shape \(1, 3\)",
         ),
         (
             lambda: ClosedLoop(RotatingEllipsoid(), DelayedFeedback([GAIN] * 3, TAU), Saturation([1.0, 2.0])),
-            "must have one size",
+            "must have one batch size with the plant and the limits, but is in a loop of batches of 2 and 3",
         ),
     ],
 )
