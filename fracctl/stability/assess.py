@@ -36,6 +36,7 @@ def assess(loop: ClosedLoop) -> Verdict:
 
     Raises:
         ArgumentError: the loop is a batch.
+        UnsupportedError: a term has the highest order of its coordinate, or the loop is not linear.
     """
     if loop.batch is not None:
         raise ArgumentError("loop", f"a batch of {loop.batch}", "must be a single loop; solve a batch for its verdicts")

@@ -94,7 +94,7 @@ def margins(loop: ClosedLoop) -> Margins:
         loop: of a linear plant and a linear law; a saturation plays no part.
 
     Raises:
-        UnsupportedError: the loop is not linear, or has delays.
+        UnsupportedError: the loop is not linear, has delays, or a term of the highest order of its coordinate.
     """
     response = FrequencyResponse(loop)
     unstable, marginal = unstable_zeros(response.matrix)
