@@ -70,14 +70,15 @@ def check_names(dispersions: Mapping[str, Distribution], known: Collection[str])
 def draws(distributions: Mapping[str, Distribution], seed: int, samples: Sequence[int]) -> dict[str, Floats]:
     """Return the numbers of some samples by name, (s,) each.
 
-    A sample depends on the seed and its own number alone, so that it can be drawn again by itself.
+    A number depends on the seed, on that of its sample and on its own name alone: a sample can be drawn again by
+    itself, and names in another order, or others beside them, change nothing.
     """
-    table = {name: np.empty(len(samples)) for name in distributions}
-    for place, sample in enumerate(samples):
-        random = np.random.default_rng([seed, sample])
-        for name, distribution in distributions.items():
-            table[name][place] = distribution.draw(random)
-    return table
+
+    def each(name: str, distribution: Distribution) -> Iterator[float]:
+        for sample in samples:
+            yield distribution.draw(np.random.default_rng([seed, sample, *name.encode()]))
+
+    return {name: np.array(list(each(name, distribution))) for name, distribution in distributions.items()}
 
 
 def quantile_interval(count: int, share: float) -> tuple[int | None, int | None]:

@@ -55,6 +55,18 @@ def test_a_sample_can_be_drawn_again_by_its_number(drawn: dict[str, np.ndarray])
     assert draws(DISTRIBUTIONS, 1, [17])["speed"] != again["speed"], "another seed, other numbers"
 
 
+def test_a_number_does_not_depend_on_what_is_drawn_beside_it(drawn: dict[str, np.ndarray]) -> None:
+    """The order of names in a configuration is not in the id of a run, so it must not change its numbers."""
+    backwards = draws(dict(reversed(DISTRIBUTIONS.items())), 0, range(20))
+    assert {name: values.tolist() for name, values in backwards.items()} == {
+        n: v[:20].tolist() for n, v in drawn.items()
+    }
+    alone = draws({"sign": DISTRIBUTIONS["sign"]}, 0, range(20))
+    assert alone["sign"].tolist() == drawn["sign"][:20].tolist()
+    alike = draws({name: Distribution("normal", (0.0, 1.0)) for name in ("theta", "phi")}, 0, range(20))
+    assert not np.any(alike["theta"] == alike["phi"])
+
+
 def test_no_spread_is_the_mean() -> None:
     sure = {"a": Distribution("normal", (0.7, 0.0)), "b": Distribution("uniform", (2.0, 2.0))}
     table = draws({**sure, "c": Distribution("choice", (5.0,))}, 3, range(4))
