@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from fracctl.arrays import Array, Floats, finite
 from fracctl.characteristic.bounds import pole_radius
 from fracctl.characteristic.matrix import CharacteristicMatrix
-from fracctl.characteristic.winding import abscissa_bound, unstable_zeros
+from fracctl.characteristic.winding import abscissa_bound, unstable_zeros, verdicts
 from fracctl.errors import UnsupportedError
 from fracctl.fractional.system import LinearFractionalSystem, unsolved_for_highest
 from fracctl.loop import ClosedLoop, Need
@@ -88,10 +88,8 @@ class BatchSolver(ABC):
             matrix = CharacteristicMatrix(members.system)
             radius = pole_radius(matrix)
             zeros, marginal = unstable_zeros(matrix, radius)
-            stable = (zeros == 0.0).astype(object)
-            stable[marginal] = None
-            members = replace(members, stable=stable)
-            unstable = ~marginal & (zeros > 0.0)
+            members = replace(members, stable=verdicts(zeros, marginal))
+            unstable = zeros > 0.0
             shift = np.zeros(len(which))
             if members.every and unstable.any():
                 shift[unstable] = _growth(matrix.take(np.flatnonzero(unstable)), members.horizon)

@@ -78,6 +78,17 @@ def test_free_motion_is_marginal(plant: LinearPlant, alpha: float) -> None:
     assert stability.assess(ClosedLoop(plant, PDAlpha(nothing, nothing, alpha))).stable is None
 
 
+def test_a_zero_at_the_origin_hides_no_instability_of_another_coordinate() -> None:
+    """Free motion in plane is marginal; out of plane σ² - σ + 1 = 0 has the zeros 0.5 ± 0.87i."""
+    gain = np.diag([0.0, 0.0, -1.0])
+    verdict = stability.assess(ClosedLoop(HCW(), PDAlpha(np.zeros((3, 3)), gain, 1.0)))
+    assert verdict.stable is False
+    assert "2 zeros of uncoupled coordinates" in verdict.certificate
+    assert same_set(verdict.poles[:2], np.array([0.5 + 0.75**0.5 * 1j, 0.5 - 0.75**0.5 * 1j]), 1e-9)
+    batch = ClosedLoop(HCW(), PDAlpha(np.zeros((3, 3)), np.stack([gain, -gain, 0.0 * gain]), 1.0))
+    assert stability.margins(batch).stable.tolist() == [False, None, None]
+
+
 @pytest.mark.parametrize(
     ("k_p", "k_d", "expected"),
     [
