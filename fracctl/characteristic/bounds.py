@@ -7,6 +7,7 @@ import numpy as np
 from fracctl.arrays import Array, Floats
 from fracctl.characteristic.matrix import CharacteristicMatrix, Entry
 from fracctl.compiling import compiled, inlined
+from fracctl.errors import UnsupportedError
 
 SMALLEST_RADIUS = 1e-2
 """Least bound that is returned, also for loops whose poles all lie at the origin."""
@@ -21,11 +22,20 @@ def pole_radius(matrix: CharacteristicMatrix) -> Floats:
     M̃(σ) = I + N(σ) is regular wherever a norm of N is below 1. With the row sums of Σ_e |c_e| r^e, which decrease
     in r, R is the radius at which the largest row sum is 1 (Cauchy's bound, for matrices and real exponents), or
     the same with column sums where that is smaller; both to 2 %, from above.
+
+    Raises:
+        UnsupportedError: an order is so near the highest of its coordinate that R is beyond all numbers.
     """
     c, e, place = matrix.powers_of(list(range(matrix.size)))
     lags, largest, slowest, top = np.full((1, len(place)), _NO_LAG), np.abs(c).max(axis=0), e.max(axis=0), 1.0
     while min(np.bincount(axis, largest * top**slowest).max() for axis in place.T) > 2.0:
         top *= 2.0
+        if not np.isfinite(top):
+            gap = -slowest[slowest < 0.0].max()
+            raise UnsupportedError(
+                f"an order is only {gap:.3g} below the highest of its coordinate, so that poles may lie beyond all"
+                " bounds; lower the order or drop the term"
+            )
     radii: Floats = _radii(c, e, lags, place, matrix.size, _ladder(top, _RATIO), True)
     return radii
 

@@ -11,7 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from fracctl.arrays import Array, Complexes, Floats
-from fracctl.fractional.system import LinearFractionalSystem
+from fracctl.errors import UnsupportedError
+from fracctl.fractional.system import LinearFractionalSystem, unsolved_for_highest
 from fracctl.fractional.terms import powers
 
 
@@ -64,9 +65,15 @@ class CharacteristicMatrix:
 
     Args:
         system: the loop's equation.
+
+    Raises:
+        UnsupportedError: a term has the highest order of its coordinate, so that M̃ does not tend to I.
     """
 
     def __init__(self, system: LinearFractionalSystem) -> None:
+        refusal = unsolved_for_highest(system, "the characteristic equation")
+        if refusal:
+            raise UnsupportedError(refusal)
         self.system = system
         self.size = system.size
         self.batch = system.batch or 1

@@ -32,8 +32,8 @@ def unstable_zeros(matrix: CharacteristicMatrix, radius: Floats | None = None) -
         radius: its `pole_radius`, if that is known already.
 
     Returns:
-        The counts (b,), NaN where a zero lies on the imaginary axis to rounding, and whether (b,) the loop is
-        marginal in that sense.
+        The counts (b,), and whether (b,) a zero lies on the imaginary axis to rounding; then the count is that of the
+        coordinates that are not coupled to it, and so a lower bound.
     """
     radius = pole_radius(matrix) if radius is None else radius
     zeros, resolved = np.zeros(matrix.batch), np.ones(matrix.batch, dtype=bool)
@@ -45,9 +45,16 @@ def unstable_zeros(matrix: CharacteristicMatrix, radius: Floats | None = None) -
             if len(undecided):
                 part = equation if len(undecided) == len(rows) else equation.take(undecided)
                 found[undecided], clear[undecided] = _followed(part, outer)
-            zeros[rows] += found
+            zeros[rows] += np.where(clear, found, 0.0)
             resolved[rows] &= clear
-    return np.where(resolved, zeros, np.nan), ~resolved
+    return zeros, ~resolved
+
+
+def verdicts(zeros: Floats, marginal: Booleans) -> Array:
+    """Return what `unstable_zeros` has found as True, False, or None for nobody knows, (b,) objects."""
+    stable = np.array(zeros == 0.0, dtype=object)
+    stable[marginal & (zeros == 0.0)] = None
+    return stable
 
 
 def _by_sign(equation: Equation, highest: Floats) -> tuple[Floats, Booleans, Booleans]:

@@ -53,3 +53,25 @@ class LinearFractionalSystem:
             self.auxiliary_initial,
             len(rows),
         )
+
+
+def order_margin(system: LinearFractionalSystem) -> float:
+    """Return by how much, at least, the orders of all terms but the first lie below the highest of their column."""
+    margins = [
+        float(np.min((system.highest - term.orders)[..., used]))
+        for term in system.dynamics[1:]
+        if np.any(used := term.matrix.reshape(-1, system.size).any(axis=0))
+    ]
+    return min(margins, default=np.inf)
+
+
+def unsolved_for_highest(system: LinearFractionalSystem, taker: str) -> str | None:
+    """Return why `taker` refuses a system with a term of the highest order of its column, or None."""
+    margin = order_margin(system)
+    if margin > 0.0:
+        return None
+    found = "of that order" if margin == 0.0 else f"{-margin:g} above it"
+    return (
+        f"{taker} takes terms of an order below the highest of their coordinate (2 for positions, 1 for auxiliary"
+        f" states), but one is {found}; solve the equation for its highest derivatives"
+    )

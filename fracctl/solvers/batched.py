@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike
 from fracctl.arrays import Array, Floats, finite
 from fracctl.characteristic.bounds import pole_radius
 from fracctl.characteristic.matrix import CharacteristicMatrix
-from fracctl.characteristic.winding import abscissa_bound, unstable_zeros
+from fracctl.characteristic.winding import abscissa_bound, unstable_zeros, verdicts
 from fracctl.errors import UnsupportedError
-from fracctl.fractional.system import LinearFractionalSystem
+from fracctl.fractional.system import LinearFractionalSystem, unsolved_for_highest
 from fracctl.loop import ClosedLoop, Need
 from fracctl.solvers.base import Survey
 from fracctl.solvers.members import Members, common_batch, equal_orders, positive
@@ -88,10 +88,8 @@ class BatchSolver(ABC):
             matrix = CharacteristicMatrix(members.system)
             radius = pole_radius(matrix)
             zeros, marginal = unstable_zeros(matrix, radius)
-            stable = (zeros == 0.0).astype(object)
-            stable[marginal] = None
-            members = replace(members, stable=stable)
-            unstable = ~marginal & (zeros > 0.0)
+            members = replace(members, stable=verdicts(zeros, marginal))
+            unstable = zeros > 0.0
             shift = np.zeros(len(which))
             if members.every and unstable.any():
                 shift[unstable] = _growth(matrix.take(np.flatnonzero(unstable)), members.horizon)
@@ -103,14 +101,7 @@ class BatchSolver(ABC):
 
     def _refusal(self, system: LinearFractionalSystem) -> str | None:
         """Return why a linear loop is refused, or None."""
-        margin = order_margin(system)
-        if margin > 0.0:
-            return None
-        return (
-            f"the {self.name} solver takes terms of an order below the highest of their coordinate (2 for positions,"
-            f" 1 for auxiliary states), but one is {-margin + 0.0:g} above it; solve the equation for its highest"
-            " derivatives"
-        )
+        return unsolved_for_highest(system, f"the {self.name} solver")
 
     @abstractmethod
     def _solved(self, members: Members, rows: Array, radius: Floats, shift: Floats) -> Iterator[Survey]:
@@ -122,16 +113,6 @@ class BatchSolver(ABC):
             radius: bounds on the magnitudes of their poles.
             shift: bounds on the real parts of the poles of unstable members that want a trajectory, 0 for others.
         """
-
-
-def order_margin(system: LinearFractionalSystem) -> float:
-    """Return by how much, at least, the orders of all terms but the first lie below the highest of their column."""
-    margins = [
-        float(np.min((system.highest - term.orders)[..., used]))
-        for term in system.dynamics[1:]
-        if np.any(used := term.matrix.reshape(-1, system.size).any(axis=0))
-    ]
-    return min(margins, default=np.inf)
 
 
 def _growth(matrix: CharacteristicMatrix, horizon: float) -> Floats:

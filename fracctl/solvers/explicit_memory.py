@@ -15,9 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fracctl.arrays import Array, Booleans, Floats, finite, share
-from fracctl.characteristic.bounds import pole_radius
 from fracctl.characteristic.matrix import CharacteristicMatrix
-from fracctl.characteristic.winding import unstable_zeros
+from fracctl.characteristic.winding import unstable_zeros, verdicts
 from fracctl.errors import ArgumentError, UnsupportedError
 from fracctl.loop import ClosedLoop, Need
 from fracctl.panels import Panel, PanelGrid
@@ -236,16 +235,15 @@ def _states(loop: ClosedLoop, states: Floats) -> tuple[Floats, Floats, Floats]:
 
 def _verdicts(loop: ClosedLoop, batch: int, horizon: float) -> Array:
     """Return True, False, or None where nobody knows, (b,) objects: whether poles lie in the right half plane."""
-    verdicts = np.full(batch, None, dtype=object)
+    known = np.full(batch, None, dtype=object)
     if not isinstance(loop.plant, LinearPlant) or loop.saturation is not None:
-        return verdicts
+        return known
     nothing = np.zeros((1, 1, loop.system.size))
     everyone = Members(replace(loop.system, batch=batch), nothing, nothing, horizon, every=False)
     for which in equal_orders(everyone.system, 1):
         matrix = CharacteristicMatrix(everyone.take(which).system)
-        zeros, marginal = unstable_zeros(matrix, pole_radius(matrix))
-        verdicts[which[~marginal]] = zeros[~marginal] == 0.0
-    return verdicts
+        known[which] = verdicts(*unstable_zeros(matrix))
+    return known
 
 
 def _is_second_order(plant: LinearPlant | StatePlant) -> bool:

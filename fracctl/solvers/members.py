@@ -60,7 +60,10 @@ def _with_shared_orders(system: LinearFractionalSystem) -> LinearFractionalSyste
 
 
 def equal_orders(system: LinearFractionalSystem, fewest: int) -> Iterator[Array]:
-    """Yield groups of members: those that share all orders, and together all that share them with too few.
+    """Yield groups of members: those that share all orders, and together those that share them with too few.
+
+    The latter have each order in one of (-∞, 0], (0, 1] and (1, 2]: initial values enter a derivative in another way
+    in each of them.
 
     Args:
         system: the batch.
@@ -72,16 +75,23 @@ def equal_orders(system: LinearFractionalSystem, fewest: int) -> Iterator[Array]
     if not different:
         yield np.arange(batch)
         return
-    which = np.zeros(batch, dtype=np.intp)
-    for column in different:
-        values, numbers = np.unique(column, return_inverse=True)
-        which = np.unique(which * len(values) + numbers, return_inverse=True)[1]
+    which = _alike(different)
     counts = np.bincount(which)
-    few = counts[which] < fewest
-    if few.any():
-        yield np.flatnonzero(few)
+    few = np.flatnonzero(counts[which] < fewest)
+    if few.size:
+        kind = _alike([np.digitize(column[few], (0.0, 1.0), right=True) for column in different])
+        yield from (few[kind == value] for value in range(kind.max() + 1))
     for value in np.flatnonzero(counts >= fewest):
         yield np.flatnonzero(which == value)
+
+
+def _alike(columns: list[Array]) -> Array:
+    """Return numbers of members (b,) that are equal where these are equal in all columns (b,)."""
+    which = np.zeros(len(columns[0]), dtype=np.intp)
+    for column in columns:
+        values, numbers = np.unique(column, return_inverse=True)
+        which = np.unique(which * len(values) + numbers, return_inverse=True)[1]
+    return which
 
 
 def starting_states(loop: ClosedLoop, initial_state: ArrayLike) -> tuple[Floats, bool]:

@@ -17,9 +17,9 @@ from scipy.special import rgamma
 from fracctl.arrays import Array, Floats, share
 from fracctl.errors import ArgumentError, UnsupportedError
 from fracctl.fractional.series import PowerSeries, short_time_series
-from fracctl.fractional.system import LinearFractionalSystem
+from fracctl.fractional.system import LinearFractionalSystem, order_margin
 from fracctl.solvers.base import Survey
-from fracctl.solvers.batched import BatchSolver, order_margin
+from fracctl.solvers.batched import BatchSolver
 from fracctl.solvers.members import Members, whole
 from fracctl.solvers.outputs import Values, values
 from fracctl.solvers.results import packed, without_trajectory

@@ -20,7 +20,7 @@ class Verdict:
     """Whether a loop is asymptotically stable, and why."""
 
     stable: bool | None
-    """True, False, or None where a pole lies on the imaginary axis to rounding."""
+    """True, False, or None where a pole lies on the imaginary axis to rounding and none is known to lie beyond."""
     poles: Complexes
     """Principal-sheet poles, by descending real part, dimensionless."""
     certificate: str
@@ -36,6 +36,7 @@ def assess(loop: ClosedLoop) -> Verdict:
 
     Raises:
         ArgumentError: the loop is a batch.
+        UnsupportedError: a term has the highest order of its coordinate, or the loop is not linear.
     """
     if loop.batch is not None:
         raise ArgumentError("loop", f"a batch of {loop.batch}", "must be a single loop; solve a batch for its verdicts")
@@ -43,9 +44,10 @@ def assess(loop: ClosedLoop) -> Verdict:
     zeros, marginal = unstable_zeros(matrix)
     poles, complete = principal_poles(matrix)
     found = f"{len(poles)} principal-sheet poles found{'' if complete else ', not all'}"
-    if marginal[0]:
-        return Verdict(None, poles, f"det M vanishes on the imaginary axis; {found}")
     count = int(zeros[0])
+    if marginal[0]:
+        besides = f", {count} zeros of uncoupled coordinates have Re σ > 0" if count else ""
+        return Verdict(False if count else None, poles, f"det M vanishes on the imaginary axis{besides}; {found}")
     if count == 0 and len(poles) and poles[0].real > ON_THE_AXIS * abs(poles[0]):
         return Verdict(False, poles, f"a pole at {poles[0]:.3g}, though none is counted; {found}")
     return Verdict(count == 0, poles, f"{count} zeros of det M with Re σ > 0; {found}")

@@ -8,7 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from fracctl.arrays import Array, Complexes, Floats
-from fracctl.characteristic.winding import unstable_zeros
+from fracctl.characteristic.winding import unstable_zeros, verdicts
 from fracctl.loop import ClosedLoop
 from fracctl.plants.linear import LinearPlant
 from fracctl.stability.extremes import largest, roots
@@ -32,7 +32,7 @@ class Margins:
     """
 
     stable: Any
-    """True, False, or None where a pole lies on the imaginary axis to rounding."""
+    """As that of `Verdict`."""
     gain_margin: Any
     """The least factor above 1 on the control with which a pole reaches the axis; inf if there is none."""
     gain_reduction: Any
@@ -94,12 +94,10 @@ def margins(loop: ClosedLoop) -> Margins:
         loop: of a linear plant and a linear law; a saturation plays no part.
 
     Raises:
-        UnsupportedError: the loop is not linear, or has delays.
+        UnsupportedError: the loop is not linear, has delays, or a term of the highest order of its coordinate.
     """
     response = FrequencyResponse(loop)
-    unstable, marginal = unstable_zeros(response.matrix)
-    stable = np.array(unstable == 0.0, dtype=object)
-    stable[marginal] = None
+    stable = verdicts(*unstable_zeros(response.matrix))
     found: dict[str, Array] = {field.name: np.full(response.batch, np.nan) for field in fields(Margins)}
     found["stable"] = stable
     sound = np.flatnonzero(np.equal(stable, True))

@@ -9,8 +9,8 @@ from fractions import Fraction
 import numpy as np
 
 from fracctl.arrays import Array, Complexes, Floats
-from fracctl.errors import ArgumentError
-from fracctl.fractional.system import LinearFractionalSystem
+from fracctl.errors import ArgumentError, UnsupportedError
+from fracctl.fractional.system import LinearFractionalSystem, unsolved_for_highest
 from fracctl.loop import ClosedLoop
 from fracctl.stability.assess import ON_THE_AXIS, Verdict
 
@@ -47,12 +47,16 @@ def matignon(loop: ClosedLoop, largest_denominator: int = 100) -> PseudoStateVer
 
     Raises:
         ArgumentError: the loop is a batch, or the orders have no such denominator.
+        UnsupportedError: a term has the highest order of its coordinate.
 
     Source:
         Matignon, Stability results for fractional differential equations (1996); Yaylali, Butcher, Sinclair, Eq. 22.
     """
     if loop.batch is not None:
         raise ArgumentError("loop", f"a batch of {loop.batch}", "must be a single loop; solve a batch for its verdicts")
+    refusal = unsolved_for_highest(loop.system, "the pseudo-state matrix")
+    if refusal:
+        raise UnsupportedError(refusal)
     q, powers = _polynomial(loop.system, largest_denominator)
     lowest = np.array([min(n for n, matrix in powers.items() if matrix[:, k].any()) for k in range(loop.system.size)])
     shifted = _without_common_powers(powers, lowest)

@@ -36,11 +36,15 @@ class MemoryMultipliers:
     """Number of exponentials a signal."""
     steps: int
     """Steps a period."""
+    gap: float
+    """The largest change of a multiplier as steps were halved, the last two times, over its size where above 1."""
+    converged: bool
+    """Whether that is within the tolerance."""
 
     @property
-    def stable(self) -> bool:
-        """Whether all are inside the unit circle."""
-        return bool(np.all(np.abs(self.values) < 1.0))
+    def stable(self) -> bool | None:
+        """Whether all are inside the unit circle; None where they have not converged."""
+        return bool(np.all(np.abs(self.values) < 1.0)) if self.converged else None
 
     @property
     def largest(self) -> float:
@@ -74,8 +78,9 @@ def memory_multipliers(
             under a linear law whose orders of positions are at most 1, of other states at most 0.
         period: T; None for the plant's own.
         kernel_tolerance: relative error of the kernel; fewer modes or more.
-        tolerance: of the steps: they are halved until no multiplier changes by more, over its size
-            where that is above 1.
+        tolerance: of the steps: they are halved until twice no multiplier changes by more, over its size
+            where that is above 1, or until a period has 1024; then `converged` is False. Coefficients that jump
+            converge fast only where they jump between steps, as at fractions T/2^k of the period.
 
     Raises:
         ArgumentError: the loop is a batch, or there is no period.
@@ -87,10 +92,10 @@ def memory_multipliers(
     if found is None or not found > 0.0:
         raise ArgumentError("period", found, "must be a positive number, for the plant has none of its own")
     form = _ModeForm(loop, float(found), kernel_tolerance)
-    values, steps = _refined(form, tolerance)
+    values, steps, gap = _refined(form, tolerance)
     relaxing = (np.abs(values.imag) <= _REAL * np.abs(values)) & (values.real < 1.0) & (values.real > 0.0)
     isolated = (np.abs(values) > _NOTHING) & ~relaxing if form.modes else np.ones(len(values), dtype=bool)
-    return MemoryMultipliers(values, isolated, form.modes, steps)
+    return MemoryMultipliers(values, isolated, form.modes, steps, gap, gap <= tolerance)
 
 
 class _ModeForm:
@@ -143,14 +148,15 @@ class _ModeForm:
         return out
 
     def monodromy(self, steps: int) -> Floats:
-        """Return Φ(T) by Magnus's expansion, [A₁, A₂] at Gauss's points of each step."""
+        """Return Φ(T) by Magnus's expansion, [A₁, A₂] at Gauss's points of each step; e^(A T) where all are equal."""
         h = self.period / steps
-        near, far = 0.5 - math.sqrt(3.0) / 6.0, 0.5 + math.sqrt(3.0) / 6.0
+        places = h * (np.arange(steps)[:, None] + 0.5 + np.array([-1.0, 1.0]) * math.sqrt(3.0) / 6.0)
+        first = self.matrix(0.0)
+        if all(np.array_equal(self.matrix(time), first) for time in places.flat):
+            return np.asarray(expm(first * self.period))
         total = np.eye(len(self._constant))
-        for k in range(steps):
-            one, two = self.matrix((k + near) * h), self.matrix((k + far) * h)
-            if np.array_equal(one, two) and np.array_equal(one, self.matrix(0.0)):
-                return np.asarray(expm(one * self.period))
+        for near, far in places:
+            one, two = self.matrix(near), self.matrix(far)
             total = expm(0.5 * h * (one + two) + math.sqrt(3.0) / 12.0 * h * h * (two @ one - one @ two)) @ total
         return total
 
@@ -165,17 +171,18 @@ def _modes(order: float, period: float, tolerance: float) -> tuple[Floats, Float
     return kernel.rates, kernel.weights, rest
 
 
-def _refined(form: _ModeForm, tolerance: float) -> tuple[Complexes, int]:
-    """Return the multipliers by descending magnitude, and the steps that they took."""
-    steps, before = _STEPS, _eigenvalues(form.monodromy(_STEPS))
-    while steps < _MOST_STEPS:
-        steps *= 2
-        after = _eigenvalues(form.monodromy(steps))
-        gap = np.abs(after[:, None] - before).min(axis=1)
-        if np.all(gap <= tolerance * np.maximum(1.0, np.abs(after))):
-            return after, steps
-        before = after
-    return before, steps
+def _refined(form: _ModeForm, tolerance: float) -> tuple[Complexes, int, float]:
+    """Return the multipliers by descending magnitude, the steps that they took, and their last two changes' larger.
+
+    One change alone says little of coefficients that jump: nodes may share the period out as they did before.
+    """
+    steps, changes, values = _STEPS, [np.inf, np.inf], _eigenvalues(form.monodromy(_STEPS))
+    while max(changes) > tolerance and steps < _MOST_STEPS:
+        steps, before = 2 * steps, values
+        values = _eigenvalues(form.monodromy(steps))
+        distances = np.abs(values[:, None] - before).min(axis=1)
+        changes = [changes[-1], float(np.max(distances / np.maximum(1.0, np.abs(values))))]
+    return values, steps, max(changes)
 
 
 def _eigenvalues(matrix: Array) -> Complexes:

@@ -36,7 +36,7 @@ def noise_gain(loop: ClosedLoop, sample_period: float = SAMPLE_PERIOD) -> Any:
 
     Raises:
         ArgumentError: T_s is not positive.
-        UnsupportedError: the loop is not linear, or has delays.
+        UnsupportedError: the loop is not linear, has delays, or a term of the highest order of its coordinate.
     """
     if not (np.isfinite(sample_period) and sample_period > 0.0):
         raise ArgumentError("sample_period", sample_period, "must be positive")

@@ -84,6 +84,23 @@ def test_verdicts_and_growing_solutions(solver: BatchSolver) -> None:
 
 
 @EITHER
+def test_an_unstable_coordinate_beside_a_marginal_one(solver: BatchSolver) -> None:
+    """In plane nothing acts, so poles lie at 0; out of plane w'' - w' + w = 0 grows all the same."""
+    gain = np.diag([0.0, 0.0, -1.0])
+    loop = ClosedLoop(HCW(), PDAlpha(np.zeros((3, 3)), np.stack([gain, -gain]), 1.0))
+    start = np.array([1e-3, 0.0, 1e-3, 0.0, -2e-3, 0.0])
+    trajectory = solver.solve(loop, start, 6.0)
+    assert list(trajectory.stable) == [False, None]
+    assert list(trajectory.status) == ["unstable", "ok"]
+    angle = 0.75**0.5 * 6.0
+    exact = 1e-3 * np.exp(3.0) * (np.cos(angle) - 0.5 / 0.75**0.5 * np.sin(angle))
+    assert trajectory([6.0])[0, 0, 2] == pytest.approx(exact, rel=1e-6)
+    parts = list(solver.survey(loop, start[None], 6.0))
+    surveyed = {row: word for p in parts for row, word in zip(p.rows.tolist(), p.trajectory.status, strict=True)}
+    assert surveyed == {0: "unstable", 1: "ok"}
+
+
+@EITHER
 def test_a_batch_of_diagonal_gains(solver: BatchSolver) -> None:
     """Some entries of the matrix differ from member to member, others are those of the plant for all."""
     k_p, k_d = (

@@ -6,8 +6,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
+import mpmath
 import numpy as np
 import pytest
+from numpy.typing import ArrayLike
 
 from fracctl.controllers import LinearLaw, LinearLawTerms, PDAlpha, PDLag, PILambdaDMu
 from fracctl.fractional.terms import FractionalTerm
@@ -44,13 +46,13 @@ class Case:
 
 @dataclass(frozen=True)
 class Damper:
-    """υ = -k D^α w with any order α in (0, 2)."""
+    """υ = -k D^α w with any order α in [-1, 2), a number or (b,)."""
 
     k: float
-    alpha: float
+    alpha: ArrayLike
 
     def linear_terms(self, n_controls: int) -> LinearLawTerms:
-        return LinearLawTerms((FractionalTerm(np.array([[-self.k]]), np.array([self.alpha])),))
+        return LinearLawTerms((FractionalTerm(np.array([[-self.k]]), np.asarray(self.alpha, dtype=float)[..., None]),))
 
 
 def companion_case(name: str, law: LinearLaw, form: FirstOrder) -> Case:
@@ -161,3 +163,30 @@ def test_closed_forms(case: Case, solver: Solver, smooth: float, other: float) -
         assert difference <= allowed * np.abs(controls).max()
     assert trajectory.status.item() == "ok"
     assert trajectory.error_estimate.item() <= solver.tolerance
+
+
+def from_laplace(k: float, alpha: float, start: tuple[float, float], time: float) -> list[float]:
+    """Return w and υ of w'' + k D^α w + w = 0 by Talbot's inversion.
+
+    D^α w has the transform σ^α W - σ^(α-1) w(0) - σ^(α-2) w'(0), without w(0) for α ≤ 0, without w'(0) for α ≤ 1.
+    """
+    value, rate = start
+
+    def transform(sigma: mpmath.mpc, which: int) -> mpmath.mpc:
+        history = (value * sigma ** (alpha - 1) if alpha > 0 else 0) + (rate * sigma ** (alpha - 2) if alpha > 1 else 0)
+        position = (sigma * value + rate + k * history) / (sigma**2 + k * sigma**alpha + 1)
+        return (position, k * (history - sigma**alpha * position))[which]
+
+    return [float(mpmath.invertlaplace(lambda s, i=i: transform(s, i), time, method="talbot")) for i in (0, 1)]
+
+
+@pytest.mark.parametrize(("solver", "smooth", "other"), SOLVERS)
+def test_a_batch_with_orders_in_all_ranges(solver: Solver, smooth: float, other: float) -> None:
+    """Initial values enter D^α differently for α ≤ 0, 0 < α ≤ 1 and 1 < α: members of all kinds may come together."""
+    del smooth
+    alpha, times, start = [0.8, 1.3, -0.4, 1.0, 0.0, 0.5, 1.2, -1.0], [0.4, 3.0, 9.0], (0.3, 1.0)
+    trajectory = solver.solve(ClosedLoop(HCWOutOfPlane(), Damper(0.7, alpha)), np.array(start), HORIZON)
+    for i, order in enumerate(alpha):
+        exact = np.array([from_laplace(0.7, order, start, time) for time in times])
+        found = np.stack([trajectory(times)[i, :, 0], trajectory.control(times)[i, :, 0]], axis=1)
+        assert np.abs(found - exact).max() < other, order

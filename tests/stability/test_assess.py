@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
+
 import numpy as np
 import pytest
 
 from fracctl import stability
-from fracctl.controllers import PDAlpha, PILambdaDMu
-from fracctl.errors import ArgumentError
+from fracctl.controllers import LinearLawTerms, PDAlpha, PILambdaDMu
+from fracctl.errors import ArgumentError, UnsupportedError
+from fracctl.fractional.terms import FractionalTerm
 from fracctl.loop import ClosedLoop
 from fracctl.plants import HCW, HCWInPlane, HCWOutOfPlane, LinearPlant
 from tests.references import loops, poles
@@ -74,6 +78,17 @@ def test_free_motion_is_marginal(plant: LinearPlant, alpha: float) -> None:
     assert stability.assess(ClosedLoop(plant, PDAlpha(nothing, nothing, alpha))).stable is None
 
 
+def test_a_zero_at_the_origin_hides_no_instability_of_another_coordinate() -> None:
+    """Free motion in plane is marginal; out of plane σ² - σ + 1 = 0 has the zeros 0.5 ± 0.87i."""
+    gain = np.diag([0.0, 0.0, -1.0])
+    verdict = stability.assess(ClosedLoop(HCW(), PDAlpha(np.zeros((3, 3)), gain, 1.0)))
+    assert verdict.stable is False
+    assert "2 zeros of uncoupled coordinates" in verdict.certificate
+    assert same_set(verdict.poles[:2], np.array([0.5 + 0.75**0.5 * 1j, 0.5 - 0.75**0.5 * 1j]), 1e-9)
+    batch = ClosedLoop(HCW(), PDAlpha(np.zeros((3, 3)), np.stack([gain, -gain, 0.0 * gain]), 1.0))
+    assert stability.margins(batch).stable.tolist() == [False, None, None]
+
+
 @pytest.mark.parametrize(
     ("k_p", "k_d", "expected"),
     [
@@ -136,3 +151,35 @@ def test_a_small_negative_integral_gain_is_unstable(k_i: float) -> None:
     verdict = stability.assess(ClosedLoop(HCWOutOfPlane(), PILambdaDMu(0.5, k_i, 1.0, 0.5, 0.9)))
     assert verdict.stable is False
     assert verdict.poles[0] == pytest.approx((-k_i / 1.5) ** 2, rel=1e-4)
+
+
+@dataclass(frozen=True)
+class Inertia:
+    """υ = -k D^α w - 0.2 w'."""
+
+    k: float
+    alpha: float = 2.0
+
+    def linear_terms(self, n_controls: int) -> LinearLawTerms:
+        terms = ((self.k, self.alpha), (0.2, 1.0))
+        return LinearLawTerms(tuple(FractionalTerm(np.array([[-k]]), np.array([order])) for k, order in terms))
+
+
+CRITERIA = [stability.assess, stability.matignon, stability.margins, stability.noise_gain]
+
+
+@pytest.mark.parametrize("criterion", CRITERIA)
+@pytest.mark.parametrize("k", [-1.5, 0.5, 3.0])
+def test_a_term_of_the_highest_order_is_refused(criterion: Callable[[ClosedLoop], object], k: float) -> None:
+    """(1 + k) w'' + 0.2 w' + w = 0 has a pole at 1.63 for k = -1.5: M̃ does not tend to I, and no bound holds."""
+    with pytest.raises(UnsupportedError, match=r"one is of that order; solve the equation for its highest derivatives"):
+        criterion(ClosedLoop(HCWOutOfPlane(), Inertia(k)))
+
+
+def test_an_order_next_to_the_highest() -> None:
+    """Poles of σ² + k σ^α with |σ|^(2-α) = k: beyond e^100 for k = 3 and 2 - α = 0.01, beyond all numbers for 1e-4."""
+    verdict = stability.assess(ClosedLoop(HCWOutOfPlane(), Inertia(-3.0, 1.99)))
+    assert verdict.stable is False
+    assert verdict.poles[0] == pytest.approx(3.0**100.0, rel=1e-6)
+    with pytest.raises(UnsupportedError, match=r"an order is only 0\.0001 below the highest"):
+        stability.assess(ClosedLoop(HCWOutOfPlane(), Inertia(3.0, 1.9999)))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.linalg import expm
 
 import fracctl as fc
 from fracctl.controllers.linear import LinearLawTerms
@@ -103,6 +104,41 @@ def test_laws_with_integrals_and_lags() -> None:
         exact = np.exp(TURN * fc.stability.assess(loop).poles[:2])
         found = memory_multipliers(loop, kernel_tolerance=1e-10).values
         assert (np.abs(found - exact[:, None]).min(axis=1) < 1e-4 * np.abs(exact)).all()
+
+
+def meissner(lead: float = 0.0, level: float = 0.0) -> fc.ClosedLoop:
+    """x'' + 0.1 x' + (0.5 + 0.4 sign(cos(t + lead) - level)) x = 0: a spring that is stiff and soft by turns."""
+
+    def rates(t: np.ndarray, x: np.ndarray, u: np.ndarray) -> np.ndarray:
+        spring = 0.4 * np.sign(np.cos(t + lead) - level)
+        return np.stack([x[:, 1], -spring * x[:, 0] + u[:, 0]], axis=1)
+
+    law = fc.controllers.PDAlpha(k_p=0.5, k_d=0.1, alpha=1.0)
+    return fc.ClosedLoop(fc.plants.FunctionPlant(rates, n_states=2, n_controls=1), law)
+
+
+def exact_meissner(level: float) -> np.ndarray:
+    """Multipliers from a product of matrix exponentials over the two parts of the period."""
+    stiff, soft = (np.array([[0.0, 1.0], [-spring, -0.1]]) for spring in (0.9, 0.1))
+    share = 2.0 * np.arccos(level)
+    return np.linalg.eigvals(expm(share * stiff) @ expm((TURN - share) * soft))
+
+
+def test_coefficients_that_are_constant_at_first_only() -> None:
+    """Meissner's equation, with jumps at quarters of the period."""
+    found = memory_multipliers(meissner(), period=TURN)
+    assert np.abs(found.values - exact_meissner(0.0)[:, None]).min(axis=1).max() < 1e-8
+    assert (found.stable, found.converged) == (True, True)
+    assert found.gap < 1e-7
+
+
+def test_multipliers_that_have_not_converged_decide_nothing() -> None:
+    """With jumps within steps the error falls only as the steps, and at 64 they change nothing by chance."""
+    loop, exact = meissner(0.1, 0.3), exact_meissner(0.3)
+    found = memory_multipliers(loop, period=TURN)
+    assert (found.stable, found.converged, found.steps) == (None, False, 1024)
+    assert 1e-7 < np.abs(found.values - exact[:, None]).min(axis=1).max() < found.gap < 2e-2
+    assert memory_multipliers(loop, period=TURN, tolerance=2e-2).stable is False
 
 
 def test_what_is_refused() -> None:
