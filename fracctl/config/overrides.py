@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -40,21 +40,33 @@ def check(overrides: Sequence[Override], catalogue: Catalogue) -> None:
 
     Raises:
         UsageError: a sweep without -m, or a key that is none.
-        ConfigurationError: an unknown option, a group chosen twice, Hydra's own settings.
+        ConfigurationError: an unknown option, a group or a key given twice, Hydra's own settings.
     """
     groups = catalogue.groups()
-    chosen: dict[str, Override] = {}
+    check_once(overrides, groups)
     for override in overrides:
         _check_key(override, groups)
-        if override.key in groups:
-            if override.key in chosen:
-                _refuse_second(chosen[override.key], override)
-            chosen[override.key] = override
         if override.sweep is not None:
             _refuse_sweep(override, groups)
         if override.key in groups:
             for option in options_of(override):
                 catalogue.require(override.key, option)
+
+
+def check_once(overrides: Sequence[Override], groups: Sequence[str]) -> None:
+    """Refuse a group or a key that two words give, of which Hydra would take the last; sweeps count as one word.
+
+    Raises:
+        ConfigurationError: there is one.
+    """
+    given: dict[str, Override] = {}
+    for override in overrides:
+        for key in _keys(override.key, override.value):
+            if key in given and key in groups:
+                _refuse_second_option(given[key], override)
+            if key in given:
+                _refuse_second_value(key, given[key], override)
+            given[key] = override
 
 
 def options_of(override: Override) -> tuple[str, ...]:
@@ -107,7 +119,23 @@ def _check_key(override: Override, groups: Sequence[str]) -> None:
         raise ConfigurationError(f"there is no group '{key}'{suggestion(key.split('/')[0], groups)}")
 
 
-def _refuse_second(first: Override, second: Override) -> None:
+def _keys(key: str, value: Any) -> Iterator[str]:
+    """Yield the keys that a word sets: those of a mapping one by one."""
+    if isinstance(value, Mapping) and value:
+        for name, entry in value.items():
+            yield from _keys(f"{key}.{name}", entry)
+    else:
+        yield key
+
+
+def _refuse_second_value(key: str, first: Override, second: Override) -> None:
+    cure = "keep one of them"
+    if first.key == second.key == key and not (first.deletes or second.deletes):
+        cure = f"keep one of them; for a run with each, write -m {key}={first.written_value},{second.written_value}"
+    raise ConfigurationError(f"{key} is set twice, '{first.text}' and '{second.text}'; {cure}")
+
+
+def _refuse_second_option(first: Override, second: Override) -> None:
     group = first.key
     one, other = first.written_value, second.written_value
     cure = f"for both in one run, write {group}=[{one},{other}]; " if group in SEVERAL_ALLOWED else ""
