@@ -29,6 +29,7 @@ from omegaconf.errors import InterpolationResolutionError, MissingMandatoryValue
 from pydantic import ValidationError
 
 from fracctl.config.catalogue import Catalogue, catalogue
+from fracctl.config.entries import check_entries
 from fracctl.config.messages import InvalidConfiguration, problems
 from fracctl.config.origins import Origins
 from fracctl.config.overrides import Override, check, check_once, for_hydra
@@ -81,8 +82,10 @@ def _composed(overrides: Sequence[str], config_dir: Path | None) -> tuple[dict[s
         words = [for_hydra(override, found.groups()) for override in parsed]
         data, files = _load(words, loader, found)
     groups = {override.key: override.text for override in parsed if override.key in found.groups()}
-    keys = [override.key for override in parsed if override.key not in groups]
-    return data, Origins(found, files, groups, keys)
+    keys = [override for override in parsed if override.key not in groups]
+    origins = Origins(found, files, groups, [override.key for override in keys])
+    check_entries(keys, origins, data)
+    return data, origins
 
 
 def expand_multirun(overrides: Sequence[str], config_dir: Path | None = None) -> list[list[str]]:

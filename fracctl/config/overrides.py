@@ -39,7 +39,7 @@ def check(overrides: Sequence[Override], catalogue: Catalogue) -> None:
     """Refuse what composes but means nothing, or not what it says.
 
     Raises:
-        UsageError: a sweep without -m, or a key that is none.
+        UsageError: a sweep without -m, a key that is none, or a key to be removed that has a value.
         ConfigurationError: an unknown option, a group or a key given twice, Hydra's own settings.
     """
     groups = catalogue.groups()
@@ -61,12 +61,21 @@ def check_once(overrides: Sequence[Override], groups: Sequence[str]) -> None:
     """
     given: dict[str, Override] = {}
     for override in overrides:
-        for key in _keys(override.key, override.value):
+        for key, _ in keys_of(override.key, override.value):
             if key in given and key in groups:
                 _refuse_second_option(given[key], override)
             if key in given:
                 _refuse_second_value(key, given[key], override)
             given[key] = override
+
+
+def keys_of(key: str, value: Any) -> Iterator[tuple[str, Any]]:
+    """Yield the keys that a word sets, with their values: those of a mapping one by one."""
+    if isinstance(value, Mapping) and value:
+        for name, entry in value.items():
+            yield from keys_of(f"{key}.{name}", entry)
+    else:
+        yield key, value
 
 
 def options_of(override: Override) -> tuple[str, ...]:
@@ -113,19 +122,12 @@ def _check_key(override: Override, groups: Sequence[str]) -> None:
         raise ConfigurationError(
             f"'{text}': Hydra's own settings have no effect here; runs are stored below output_dir=DIR"
         )
+    if override.deletes and key not in groups and "=" in text:
+        raise UsageError(f"'{text}': a key is removed whatever its value; write '~{key}', or '{text[1:]}' to set it")
     if override.package is not None:
         raise ConfigurationError(f"'{text}': '@' has no meaning here; write {key}=NAME")
     if "/" in key and key not in groups:
         raise ConfigurationError(f"there is no group '{key}'{suggestion(key.split('/')[0], groups)}")
-
-
-def _keys(key: str, value: Any) -> Iterator[str]:
-    """Yield the keys that a word sets: those of a mapping one by one."""
-    if isinstance(value, Mapping) and value:
-        for name, entry in value.items():
-            yield from _keys(f"{key}.{name}", entry)
-    else:
-        yield key
 
 
 def _refuse_second_value(key: str, first: Override, second: Override) -> None:
