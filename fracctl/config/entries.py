@@ -1,9 +1,9 @@
-"""Names that the command line gives to entries of open mappings, where a misspelt one would be one more."""
+"""What the command line may set without effect: a misspelt entry of an open mapping, a controller beside laws."""
 
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from fracctl.config.origins import Origins
@@ -16,6 +16,7 @@ _NAMED_BY = {"evaluation.band_m": "initial_condition"}
 """Mappings whose entries have the names of another's."""
 _TAKEN_AWAY = "evaluation.dispersions"
 """The mapping in which null takes away an entry of a file."""
+_CONTROLLER = "controller"
 _ALIKE = 0.75
 
 
@@ -42,6 +43,26 @@ def check_entries(overrides: Sequence[Override], origins: Origins, composed: Map
                 raise ConfigurationError(f"unknown key '{mapping}.{name}'{_hint(mapping, name, known)}")
             if mapping == _TAKEN_AWAY and value is None:
                 raise ConfigurationError(f"{mapping}.{name} = null: takes nothing away{_hint(mapping, name, present)}")
+
+
+def check_controller(overrides: Sequence[Override], laws: Collection[str]) -> None:
+    """Refuse a controller where several laws have values of their own; one that a plant chosen with it needs may stand.
+
+    Args:
+        overrides: of groups and keys.
+        laws: names of the evaluation's laws; none where the controller is the law.
+
+    Raises:
+        ConfigurationError: the command line sets one.
+    """
+    another_plant = any(override.key == "plant" for override in overrides)
+    for override in overrides if laws else ():
+        group, _, key = override.key.partition(".")
+        if group != _CONTROLLER or override.deletes or (not key and another_plant):
+            continue
+        cure = f"set evaluation.laws.NAME.values.{key}" if key else "set keys of evaluation.laws.NAME"
+        idle = f"plays no part, for the laws are those of evaluation.laws ({', '.join(laws)})"
+        raise ConfigurationError(f"{override.text}: {idle}; {cure}")
 
 
 def _entries(override: Override) -> Iterator[tuple[str, str, Any]]:

@@ -30,8 +30,11 @@ def run_id(configuration: Mapping[str, Any], sources: str | None = None) -> str:
         configuration: plain data, resolved, the seed included.
         sources: digest of the program; default: that of the package's sources.
     """
+    several_laws = configuration.get("evaluation", {}).get("laws")
+    idle = {*NOT_IN_IDENTITY, "controller"} if several_laws else {*NOT_IN_IDENTITY}
+    configuration = {key: value for key, value in configuration.items() if key not in idle}
     what = {
-        "configuration": {key: value for key, value in configuration.items() if key not in NOT_IN_IDENTITY},
+        "configuration": configuration,
         "sources": sources_digest() if sources is None else sources,
         "versions": {name: version(name) for name in VERSIONS},
     }

@@ -69,6 +69,34 @@ def test_the_names_of_a_study_are_known(
 @pytest.mark.parametrize(
     ("words", "said"),
     [
+        (["experiment=flight_ic1", "controller.k_p_w=9"], "set evaluation.laws.NAME.values.k_p_w"),
+        (["experiment=flight_ic1", "plant=hcw", "controller.k_p_w=9"], "set evaluation.laws.NAME.values.k_p_w"),
+        (["experiment=fair_outofplane", "controller=lqr"], "the laws are those of evaluation.laws (pd, pd_alpha, "),
+        (["experiment=tether", "controller.reference_target=0.5"], "controller.reference_target=0.5: plays no part"),
+    ],
+)
+def test_a_controller_beside_laws_is_refused(words: list[str], said: str) -> None:
+    with pytest.raises(FracctlError) as caught:
+        compose(words)
+    assert said in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["experiment=flight_ic1", "evaluation=flight", "controller.k_p_w=0.85"],
+        ["experiment=flight_ic1", "plant=hcw", "controller=pd_alpha_full"],
+        ["experiment=flight_ic1", "~controller.k_p_w"],
+        ["experiment=tether_retrieval"],
+    ],
+)
+def test_a_controller_that_is_the_law_or_fits_the_plant(words: list[str]) -> None:
+    compose(words)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
         (["figures.trajectories.shows=nonsense"], "figures of type trajectories have nothing to choose; leave it out"),
         (["experiment=tether", "figures=tether", "figures.length.shows=lenght"], "did you mean 'length'?"),
         (

@@ -33,6 +33,14 @@ def test_what_may_change_a_number_changes_the_id(change: dict[str, Any]) -> None
     assert run_id(CONFIGURATION | change) != run_id(CONFIGURATION)
 
 
+def test_a_controller_beside_laws_changes_no_id() -> None:
+    other = {"controller": {"alpha_w": 0.5}}
+    several = CONFIGURATION | {"evaluation": {"laws": {"pd": {"type": "pd"}}}}
+    assert run_id(several | other) == run_id(several)
+    alone = CONFIGURATION | {"evaluation": {"laws": {}}}
+    assert run_id(alone | other) != run_id(alone)
+
+
 def test_sources_and_versions_change_the_id(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     before = run_id(CONFIGURATION)
     assert run_id(CONFIGURATION, sources="other") != before
