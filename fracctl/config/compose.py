@@ -32,7 +32,7 @@ from fracctl.config.catalogue import Catalogue, catalogue
 from fracctl.config.entries import check_controller, check_entries
 from fracctl.config.messages import InvalidConfiguration, problems
 from fracctl.config.origins import Origins
-from fracctl.config.overrides import Override, check, check_once, for_hydra
+from fracctl.config.overrides import Override, check, for_hydra
 from fracctl.config.schemas import RunConfig
 from fracctl.config.studies import studies_here, study_file, with_study
 from fracctl.config.yaml_traps import traps
@@ -95,12 +95,10 @@ def expand_multirun(overrides: Sequence[str], config_dir: Path | None = None) ->
 
     Raises:
         UsageError: a word is no override, a sweep is empty or has no list of values, or there are too many runs.
-        ConfigurationError: a group or a key is given twice.
     """
     found = catalogue(config_dir)
     with _hydra(found) as loader:
         parsed = [_parse(text, loader, found) for text in overrides if study_file(text) is None]
-    check_once(parsed, found.groups())
     choices = [[text] for text in overrides if study_file(text) is not None]
     for override in parsed:
         if override.sweep is None:

@@ -40,12 +40,16 @@ def check(overrides: Sequence[Override], catalogue: Catalogue) -> None:
 
     Raises:
         UsageError: a sweep without -m, a key that is none, or a key to be removed that has a value.
-        ConfigurationError: an unknown option, a group or a key given twice, Hydra's own settings.
+        ConfigurationError: an unknown option, a group chosen twice, Hydra's own settings.
     """
     groups = catalogue.groups()
-    check_once(overrides, groups)
+    chosen: dict[str, Override] = {}
     for override in overrides:
         _check_key(override, groups)
+        if override.key in groups:
+            if override.key in chosen:
+                _refuse_second(chosen[override.key], override)
+            chosen[override.key] = override
         if override.sweep is not None:
             _refuse_sweep(override, groups)
         if override.key in groups:
@@ -53,20 +57,24 @@ def check(overrides: Sequence[Override], catalogue: Catalogue) -> None:
                 catalogue.require(override.key, option)
 
 
-def check_once(overrides: Sequence[Override], groups: Sequence[str]) -> None:
-    """Refuse a group or a key that two words give, of which Hydra would take the last; sweeps count as one word.
+def check_once(words: Sequence[str], groups: Sequence[str]) -> None:
+    """Refuse a key that two words of a command line set, of which Hydra would take the last; `check` refuses groups.
 
     Raises:
         ConfigurationError: there is one.
     """
-    given: dict[str, Override] = {}
-    for override in overrides:
-        for key, _ in keys_of(override.key, override.value):
-            if key in given and key in groups:
-                _refuse_second_option(given[key], override)
-            if key in given:
-                _refuse_second_value(key, given[key], override)
-            given[key] = override
+    given: dict[str, str] = {}
+    for word in words:
+        key, equals, value = word.lstrip("~+").partition("=")
+        if key in groups or not (equals or word.startswith("~")):
+            continue
+        if key in given:
+            first = given[key]
+            both = f"{first.partition('=')[2]},{value}"
+            removes = word.startswith("~") or first.startswith("~")
+            each = "" if removes else f"; for a run with each, write -m {key}={both}"
+            raise ConfigurationError(f"{key} is set twice, '{first}' and '{word}'; keep one of them{each}")
+        given[key] = word
 
 
 def keys_of(key: str, value: Any) -> Iterator[tuple[str, Any]]:
@@ -130,14 +138,7 @@ def _check_key(override: Override, groups: Sequence[str]) -> None:
         raise ConfigurationError(f"there is no group '{key}'{suggestion(key.split('/')[0], groups)}")
 
 
-def _refuse_second_value(key: str, first: Override, second: Override) -> None:
-    cure = "keep one of them"
-    if first.key == second.key == key and not (first.deletes or second.deletes):
-        cure = f"keep one of them; for a run with each, write -m {key}={first.written_value},{second.written_value}"
-    raise ConfigurationError(f"{key} is set twice, '{first.text}' and '{second.text}'; {cure}")
-
-
-def _refuse_second_option(first: Override, second: Override) -> None:
+def _refuse_second(first: Override, second: Override) -> None:
     group = first.key
     one, other = first.written_value, second.written_value
     cure = f"for both in one run, write {group}=[{one},{other}]; " if group in SEVERAL_ALLOWED else ""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from fracctl.config.compose import expand_multirun
-from fracctl.errors import ConfigurationError, UsageError
+from fracctl.errors import UsageError
 
 
 @pytest.mark.parametrize(
@@ -49,11 +49,3 @@ def test_sweeps_that_are_none(word: str, said: str) -> None:
 def test_the_product_of_sweeps_is_limited() -> None:
     with pytest.raises(UsageError, match="axes of a survey"):
         expand_multirun(["a=range(0,200)", "b=range(0,200)"])
-
-
-@pytest.mark.parametrize(
-    "words", [["seed=1,2", "seed=3"], ["seed=3", "seed=1,2"], ["plant=hcw,libration", "plant=hcw"]]
-)
-def test_a_sweep_over_what_another_word_sets_is_refused(words: list[str]) -> None:
-    with pytest.raises(ConfigurationError, match="twice, "):
-        expand_multirun(words)
