@@ -95,11 +95,13 @@ class Computation:
             with run_log(self._directory.log), lent as executor:
                 self._record.provenance["workers"] = executor.workers
                 summary = self._compute(executor)
+            if summary["status"] != "finished":
+                summary["notes"] += self._directory.kept
             self._record.write(summary["status"], summary, summary["error"])
             self._directory.write_manifest()
         if summary["status"] == "finished":
             remove_tree(self._directory.parts)
-        self._directory.forget_aside()
+            self._directory.forget_aside()
 
     @contextmanager
     def _ending_recorded(self) -> Iterator[None]:
@@ -112,6 +114,8 @@ class Computation:
                     self._record.write("interrupted")
                 else:
                     self._record.write("failed", error=describe(problem))
+            if isinstance(problem, RunError) and self._directory.kept:
+                raise RunError(f"{problem}; {self._directory.kept[0]}") from problem
             raise
 
     def _compute(self, executor: WorkerExecutor) -> dict[str, Any]:

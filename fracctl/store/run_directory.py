@@ -221,6 +221,11 @@ class RunDirectory:
         remove_tree(self.aside)
 
     @property
+    def kept(self) -> list[str]:
+        """A sentence on the run that is kept beside, none where there is none."""
+        return [f"the run that was stored here before is kept in {self.aside}"] if self.aside.exists() else []
+
+    @property
     def aside(self) -> Path:
         """Where `set_aside` keeps a run."""
         return self.path.with_name(f".{self.path.name}.old")

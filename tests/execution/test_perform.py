@@ -193,6 +193,26 @@ def test_a_damaged_run_is_computed_again_with_a_note(tmp_path: Path, undisturbed
     assert RunDirectory(again.run_directory).verify() == []
 
 
+def test_fresh_keeps_a_finished_run_that_a_worse_one_would_replace(tmp_path: Path, undisturbed: Path) -> None:
+    first = perform(job(tmp_path)).run_directory
+    aside = first.with_name(f".{first.name}.old")
+    kept = f"the run that was stored here before is kept in {aside}"
+    for alphas in ((0.8,), (0.8, 0.85)):
+        faults = [{"kind": "raises", "alpha_w": alpha} for alpha in alphas]
+        worse = perform(job(tmp_path, faults=faults), fresh=True)
+        assert worse.status == "incomplete"
+        assert kept in worse.summary["notes"]
+        assert tables_of(aside) == tables_of(undisturbed)
+    faults = [{"kind": "raises", "alpha_w": alpha} for alpha in (0.8, 0.85, 0.9, 0.95, 1.0)]
+    with pytest.raises(RunError, match=r"every point failed: .*; the run that was stored here before is kept in "):
+        perform(job(tmp_path, faults=faults), fresh=True)
+    assert RunDirectory(aside).verify() == []
+    better = perform(job(tmp_path))
+    assert better.status == "finished"
+    assert kept not in better.summary["notes"]
+    assert not aside.exists()
+
+
 @pytest.mark.parametrize("name", ["optima.parquet", "run.json"])
 @pytest.mark.parametrize("survey", [None, "searches"])
 def test_what_is_made_of_whole_points_is_made_again_alone(tmp_path: Path, name: str, survey: str | None) -> None:
