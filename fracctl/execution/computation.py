@@ -14,7 +14,7 @@ import pyarrow as pa
 from fracctl.errors import RunError
 from fracctl.evaluation import COUNTERS, Conclusion
 from fracctl.execution.cross_check import CrossCheck
-from fracctl.execution.drawing import draw_figures
+from fracctl.execution.drawing import UNDRAWN, draw_figures
 from fracctl.execution.executors import Executors
 from fracctl.execution.frequency_response import frequency_responses
 from fracctl.execution.gathering import Gathering
@@ -149,7 +149,8 @@ class Computation:
             "run_directory": str(self._directory.path),
         }
         tables = {"tables": plain_tables(conclusion.shown)} if conclusion.shown else {}
-        return summarise(identity, store, found, notes) | tables | check.summary() | poles.summary()
+        figures = {UNDRAWN: undrawn}
+        return summarise(identity, store, found, notes) | figures | tables | check.summary() | poles.summary()
 
     def _evaluate(self, executor: WorkerExecutor, gathering: Gathering) -> RowStore:
         """Take the survey through the executor; rows are stored and gathered while workers compute the next."""

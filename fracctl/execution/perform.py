@@ -10,13 +10,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fracctl.execution.computation import Computation, Job
-from fracctl.execution.drawing import draw_figures
+from fracctl.execution.drawing import UNDRAWN, draw_figures
 from fracctl.execution.executors import Executors
 from fracctl.execution.progress import NoProgress, Progress
 from fracctl.execution.restoring import restore_parts
 from fracctl.execution.threads import single_threaded
 from fracctl.store import RunDirectory, directory_of
-from fracctl.store.files import make_directory, remove_tree
+from fracctl.store.files import make_directory
 from fracctl.store.lock import exclusive
 from fracctl.store.manifest import NAME
 
@@ -131,15 +131,13 @@ def _wants_other_figures(directory: RunDirectory, job: Job) -> bool:
 
 
 def _redrawn(directory: RunDirectory, job: Job) -> RunResult:
-    """Return a stored run with the figures asked for now."""
-    figures = job.configuration["figures"]
+    """Return a stored run with the figures asked for now; the record of them is written when they are there."""
     content = directory.run_json
-    content["configuration"]["figures"] = figures
-    remove_tree(directory.figures)
+    content["configuration"]["figures"] = job.configuration["figures"]
+    summary = content["summary"]
+    undrawn = draw_figures(directory, job.configuration["figures"])
+    summary["notes"] = [note for note in summary["notes"] if note not in summary[UNDRAWN]] + undrawn
+    summary[UNDRAWN] = undrawn
     directory.write_run_json(content)
     directory.write_manifest()
-    notes = draw_figures(directory, figures)
-    directory.write_manifest()
-    result = stored(directory)
-    result.summary["notes"] += notes
-    return result
+    return stored(directory)

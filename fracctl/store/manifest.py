@@ -13,7 +13,9 @@ REPORT = "report.html"
 """Made of a run at any time, and no part of it."""
 LOG = "run.log"
 """Nothing is made of it; whoever writes into it changes no result."""
-_LEFT_OUT = (NAME, PARTS, REPORT, LOG)
+NEW_FIGURES = f"figures{TEMPORARY}"
+"""Figures that are being drawn."""
+_LEFT_OUT = (NAME, PARTS, REPORT, LOG, NEW_FIGURES)
 
 
 def write(directory: Path) -> None:

@@ -38,6 +38,7 @@ class RunDirectory:
         self.frequency_response_path = self.path / "frequency_response.parquet"
         self.trajectories_path = self.path / "trajectories.parquet"
         self.figures = self.path / "figures"
+        self.new_figures = self.path / manifest.NEW_FIGURES
         self.parts = self.path / manifest.PARTS
         self.log = self.path / manifest.LOG
         self.report = self.path / manifest.REPORT
