@@ -58,10 +58,16 @@ class Parser(argparse.ArgumentParser):
 
         Raises:
             UsageError: an option is unknown, or lacks its value.
+            ConfigurationError: two words set the same key.
         """
         options, unknown = self.parse_known_intermixed_args(list(arguments))
         for word in unknown:
             raise UsageError(f"unknown option '{word}'{suggestion(word.partition('=')[0], self.flags)}")
+        if overrides := getattr(options, "overrides", None):
+            from fracctl.config.catalogue import catalogue
+            from fracctl.config.overrides import check_once
+
+            check_once(overrides, catalogue(getattr(options, "config_dir", None)).groups())
         return options
 
     @property

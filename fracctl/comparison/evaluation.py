@@ -19,6 +19,7 @@ from fracctl.errors import ArgumentError, UnsupportedError, suggestion
 from fracctl.evaluation import COUNTERS, Conclusion, Evaluation, ParametrisedLaw
 from fracctl.measures import ControlEffort, PeakAcceleration
 from fracctl.measures.base import Measure
+from fracctl.surveys.search import KINDS
 from fracctl.surveys.search_run import Variable
 
 LAW, PART, LIMIT = "law", "part", "limit"
@@ -88,6 +89,8 @@ class ComparisonEvaluation(Evaluation):
             raise ArgumentError("thresholds_m", list(self.thresholds_m), "must hold a band, with a limit beside it")
         if self.widest_gain < max(self.gain_limits, default=0.0):
             raise ArgumentError("widest_gain", self.widest_gain, "must be no less than the largest of `gain_limits`")
+        for kind, ends in self.bounds.items():
+            check_kind("bounds", kind, list(ends), [kind for kind in KINDS if kind != "gains"])
         for name in self.laws:
             self._check_law(name)
 
@@ -263,6 +266,13 @@ class ComparisonEvaluation(Evaluation):
             UnsupportedError: always.
         """
         raise UnsupportedError("evaluation: comparison goes with survey: comparison only")
+
+
+def check_kind(argument: str, kind: str, value: object, known: Sequence[str]) -> None:
+    """Raise ArgumentError unless a key names a kind of parameters."""
+    if kind not in known:
+        allowed = f"has no meaning, for kinds of parameters are {', '.join(known)}{suggestion(kind, known)}"
+        raise ArgumentError(f"{argument}.{kind}", value, allowed)
 
 
 def sound(rows: Mapping[str, Array]) -> Booleans:

@@ -10,7 +10,7 @@ import numpy as np
 
 from fracctl.arrays import Array, Floats
 from fracctl.comparison.bounds import BOUND, CURVE, Case, OpenLoopBounds
-from fracctl.comparison.evaluation import LAW, OPEN_LOOP, PART, ComparisonEvaluation
+from fracctl.comparison.evaluation import LAW, OPEN_LOOP, PART, ComparisonEvaluation, check_kind
 from fracctl.comparison.laws import Law
 from fracctl.comparison.problems import MOST_GRID_VARIABLES, PEAK, Problem, settling_time_within
 from fracctl.comparison.robustness import Robustness
@@ -20,9 +20,11 @@ from fracctl.errors import ArgumentError, UnsupportedError
 from fracctl.evaluation import Evaluation
 from fracctl.measures import PeakAcceleration
 from fracctl.surveys.base import SEARCH_COLUMNS, Block, Rows, Search
+from fracctl.surveys.search import KINDS
 
 SMALLEST_POPULATION = 8
 _GRID_BLOCK = 12_000
+_FEWEST_VALUES = 2
 _CURVE_POINTS = 16
 _ABREAST = 8
 """Starts in a block."""
@@ -49,11 +51,12 @@ class Comparison:
         rounds: after it.
         polish: of a round by CMA-ES, likewise.
         population: points of a generation.
-        grid: number of values of each gain, and of all ``orders``, ``times`` and ``weights``; null for no grids.
+        grid: number of values of all ``gains``, ``orders``, ``times`` and ``weights``; null for no grids.
         interior: points inside the box around a best point.
 
     Raises:
-        ArgumentError: the evaluation is no comparison, or a number is too small.
+        ArgumentError: the evaluation is no comparison, a number is too small, or a grid lacks a kind of parameter or
+            names none.
     """
 
     columns = SEARCH_COLUMNS
@@ -92,6 +95,7 @@ class Comparison:
         self._comparison, self._seed, self._starts = evaluation, seed, starts
         self._evaluations, self._population, self._grid = evaluations, population, dict(grid or {})
         self._polish, self._interior = polish, interior
+        self._check_grid()
         onward = [partial(self._onward, number) for number in range(1, 1 + rounds)]
         phases: tuple[Callable[[], Iterator[_Asked]], ...] = (self._searches, *onward, self._studies)
         self._phases = iter(phases)
@@ -142,6 +146,17 @@ class Comparison:
                 search = Evolution(name, condition, comparison.problems, starts, seeds, *budget)
                 yield law.searched.natural(law.design(search.first_points(comparison, law)[:, 0])), search
 
+    def _check_grid(self) -> None:
+        for kind, count in self._grid.items():
+            check_kind("grid", kind, count, KINDS)
+            if count < _FEWEST_VALUES:
+                raise ArgumentError(f"grid.{kind}", count, f"must be at least {_FEWEST_VALUES}, both ends of the range")
+        for law in map(self._comparison.law_of, self._comparison.laws):
+            for parameter in law.varied if self._has_grid(law) else ():
+                if f"{parameter.kind}s" not in self._grid:
+                    allowed = f"must hold a number of {parameter.kind}s, for {law.name} varies {parameter.name}"
+                    raise ArgumentError("grid", self._grid, allowed, "survey.grid=null is for no grids")
+
     def _abreast(self) -> list[tuple[int, ...]]:
         numbers = range(self._starts)
         return [tuple(numbers[first : first + _ABREAST]) for first in range(0, self._starts, _ABREAST)]
@@ -161,7 +176,7 @@ class Comparison:
         for largest in sorted({comparison.largest_gain(p) for p in comparison.problems}) if gains else [1.0]:
             box = comparison.box(law, largest)
             axes = [
-                tuple(np.round(np.linspace(v.lower, v.upper, self._grid.get(f"{p.kind}s", 0)), 12).tolist())
+                tuple(np.round(np.linspace(v.lower, v.upper, self._grid[f"{p.kind}s"]), 12).tolist())
                 for v, p in zip(box, law.varied, strict=True)
             ]
             inner = int(np.prod([len(axis) for axis in axes[1:]]))

@@ -29,6 +29,7 @@ from omegaconf.errors import InterpolationResolutionError, MissingMandatoryValue
 from pydantic import ValidationError
 
 from fracctl.config.catalogue import Catalogue, catalogue
+from fracctl.config.entries import check_controller, check_entries
 from fracctl.config.messages import InvalidConfiguration, problems
 from fracctl.config.origins import Origins
 from fracctl.config.overrides import Override, check, for_hydra
@@ -56,11 +57,13 @@ def compose(overrides: Sequence[str], config_dir: Path | None = None) -> RunConf
         UsageError: a word is no override, or names several runs.
         ConfigurationError: the configuration is wrong; an InvalidConfiguration lists everything that is.
     """
-    data, origins = _composed(overrides, config_dir)
+    data, origins, parsed = _composed(overrides, config_dir)
     try:
-        return RunConfig.model_validate(data)
+        config = RunConfig.model_validate(data)
     except ValidationError as error:
         raise InvalidConfiguration(problems(error, origins)) from error
+    check_controller(parsed, getattr(config.evaluation, "laws", ()))
+    return config
 
 
 def compose_plain(overrides: Sequence[str], config_dir: Path | None = None) -> dict[str, Any]:
@@ -72,7 +75,7 @@ def compose_plain(overrides: Sequence[str], config_dir: Path | None = None) -> d
     return _composed(overrides, config_dir)[0]
 
 
-def _composed(overrides: Sequence[str], config_dir: Path | None) -> tuple[dict[str, Any], Origins]:
+def _composed(overrides: Sequence[str], config_dir: Path | None) -> tuple[dict[str, Any], Origins, list[Override]]:
     overrides, study = with_study(overrides)
     found = catalogue(config_dir, study)
     with _hydra(found) as loader:
@@ -81,8 +84,10 @@ def _composed(overrides: Sequence[str], config_dir: Path | None) -> tuple[dict[s
         words = [for_hydra(override, found.groups()) for override in parsed]
         data, files = _load(words, loader, found)
     groups = {override.key: override.text for override in parsed if override.key in found.groups()}
-    keys = [override.key for override in parsed if override.key not in groups]
-    return data, Origins(found, files, groups, keys)
+    keys = [override for override in parsed if override.key not in groups]
+    origins = Origins(found, files, groups, [override.key for override in keys])
+    check_entries(keys, origins, data)
+    return data, origins, parsed
 
 
 def expand_multirun(overrides: Sequence[str], config_dir: Path | None = None) -> list[list[str]]:

@@ -64,6 +64,17 @@ class Origins:
         dotted = ".".join(str(key) for key in path)
         return [key for key in self.keys if key.startswith(f"{dotted}.")]
 
+    def entries(self, path: Path) -> list[str]:
+        """Names of the entries that files give to a mapping."""
+        found: dict[str, None] = {}
+        for config_path, package in self.files:
+            above = tuple(package.split(".")) if package else ()
+            inside: Any = self._contents[config_path] if path[: len(above)] == above else None
+            for key in path[len(above) :]:
+                inside = inside.get(str(key)) if isinstance(inside, dict) else None
+            found |= dict.fromkeys(inside if isinstance(inside, dict) else ())
+        return [name for name in found if name != "defaults"]
+
     @cached_property
     def _contents(self) -> dict[str, Any]:
         found = {}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -39,7 +39,7 @@ def check(overrides: Sequence[Override], catalogue: Catalogue) -> None:
     """Refuse what composes but means nothing, or not what it says.
 
     Raises:
-        UsageError: a sweep without -m, or a key that is none.
+        UsageError: a sweep without -m, a key that is none, or a key to be removed that has a value.
         ConfigurationError: an unknown option, a group chosen twice, Hydra's own settings.
     """
     groups = catalogue.groups()
@@ -55,6 +55,35 @@ def check(overrides: Sequence[Override], catalogue: Catalogue) -> None:
         if override.key in groups:
             for option in options_of(override):
                 catalogue.require(override.key, option)
+
+
+def check_once(words: Sequence[str], groups: Sequence[str]) -> None:
+    """Refuse a key that two words of a command line set, of which Hydra would take the last; `check` refuses groups.
+
+    Raises:
+        ConfigurationError: there is one.
+    """
+    given: dict[str, str] = {}
+    for word in words:
+        key, equals, value = word.lstrip("~+").partition("=")
+        if key in groups or not (equals or word.startswith("~")):
+            continue
+        if key in given:
+            first = given[key]
+            both = f"{first.partition('=')[2]},{value}"
+            removes = word.startswith("~") or first.startswith("~")
+            each = "" if removes else f"; for a run with each, write -m {key}={both}"
+            raise ConfigurationError(f"{key} is set twice, '{first}' and '{word}'; keep one of them{each}")
+        given[key] = word
+
+
+def keys_of(key: str, value: Any) -> Iterator[tuple[str, Any]]:
+    """Yield the keys that a word sets, with their values: those of a mapping one by one."""
+    if isinstance(value, Mapping) and value:
+        for name, entry in value.items():
+            yield from keys_of(f"{key}.{name}", entry)
+    else:
+        yield key, value
 
 
 def options_of(override: Override) -> tuple[str, ...]:
@@ -101,6 +130,8 @@ def _check_key(override: Override, groups: Sequence[str]) -> None:
         raise ConfigurationError(
             f"'{text}': Hydra's own settings have no effect here; runs are stored below output_dir=DIR"
         )
+    if override.deletes and key not in groups and "=" in text:
+        raise UsageError(f"'{text}': a key is removed whatever its value; write '~{key}', or '{text[1:]}' to set it")
     if override.package is not None:
         raise ConfigurationError(f"'{text}': '@' has no meaning here; write {key}=NAME")
     if "/" in key and key not in groups:

@@ -23,6 +23,7 @@ from fracctl.config.evaluations import (
     SpacecraftOptions,
 )
 from fracctl.config.fields import Folder, Name, Number, Strict, Typed, Whole, refusal, refuse, unknown
+from fracctl.config.options import named_factory
 from fracctl.errors import ArgumentError, suggestion
 from fracctl.measures.limits import limit
 
@@ -89,7 +90,7 @@ class Figure(Typed):
     type: Annotated[str, AfterValidator(_figure_type)]
     objective: str | None = None
     """Whose optima are shown; None for the primary one."""
-    initial_conditions: list[str] | None = None
+    initial_conditions: Annotated[list[str], Field(min_length=1)] | None = None
     """Which are shown; None for all."""
     shows: str | None = None
     """What figures that can show several things show."""
@@ -187,9 +188,28 @@ def _figures(value: dict[str, Figure], info: ValidationInfo) -> dict[str, Figure
             lines += _absent("objectives", figure.objective, (name, "objective"), info)
         for condition in figure.initial_conditions or ():
             lines += _absent("initial_condition", condition, (name, "initial_conditions"), info)
+        if figure.shows is not None:
+            lines += _shows_lines(name, figure.type, figure.shows, info)
     if lines:
         raise refuse(*lines)
     return value
+
+
+def _shows_lines(name: str, kind: str, shows: str, info: ValidationInfo) -> list[InitErrorDetails]:
+    """Errors of what a figure shall show: its builder says what it can, words of its own or measures of the run."""
+    able = getattr(named_factory("figures", kind, (name, "type")), "shows", ())
+    if able is None and "measures" not in info.data:
+        return []
+    known = parts.measure_columns(info.data["measures"]) if able is None else able
+    if not known:
+        return [refusal((name, "shows"), shows, f"figures of type {kind} have nothing to choose; leave it out")]
+    wanted = [word.strip() for word in shows.split(",")] if able is None else [shows]
+    wrong = [word for word in wanted if word not in known]
+    every = f" ({', '.join(known)})"
+    return [
+        refusal((name, "shows"), shows, f"must name what the figure can show{suggestion(word, known) or every}")
+        for word in wrong
+    ]
 
 
 def _absent(field: str, name: str, path: tuple[str, ...], info: ValidationInfo) -> list[InitErrorDetails]:

@@ -14,7 +14,7 @@ import pyarrow as pa
 from fracctl.errors import RunError
 from fracctl.evaluation import COUNTERS, Conclusion
 from fracctl.execution.cross_check import CrossCheck
-from fracctl.execution.drawing import draw_figures
+from fracctl.execution.drawing import UNDRAWN, draw_figures
 from fracctl.execution.executors import Executors
 from fracctl.execution.frequency_response import frequency_responses
 from fracctl.execution.gathering import Gathering
@@ -95,11 +95,13 @@ class Computation:
             with run_log(self._directory.log), lent as executor:
                 self._record.provenance["workers"] = executor.workers
                 summary = self._compute(executor)
+            if summary["status"] != "finished":
+                summary["notes"] += self._directory.kept
             self._record.write(summary["status"], summary, summary["error"])
             self._directory.write_manifest()
         if summary["status"] == "finished":
             remove_tree(self._directory.parts)
-        self._directory.forget_aside()
+            self._directory.forget_aside()
 
     @contextmanager
     def _ending_recorded(self) -> Iterator[None]:
@@ -112,6 +114,8 @@ class Computation:
                     self._record.write("interrupted")
                 else:
                     self._record.write("failed", error=describe(problem))
+            if isinstance(problem, RunError) and self._directory.kept:
+                raise RunError(f"{problem}; {self._directory.kept[0]}") from problem
             raise
 
     def _compute(self, executor: WorkerExecutor) -> dict[str, Any]:
@@ -145,7 +149,8 @@ class Computation:
             "run_directory": str(self._directory.path),
         }
         tables = {"tables": plain_tables(conclusion.shown)} if conclusion.shown else {}
-        return summarise(identity, store, found, notes) | tables | check.summary() | poles.summary()
+        figures = {UNDRAWN: undrawn}
+        return summarise(identity, store, found, notes) | figures | tables | check.summary() | poles.summary()
 
     def _evaluate(self, executor: WorkerExecutor, gathering: Gathering) -> RowStore:
         """Take the survey through the executor; rows are stored and gathered while workers compute the next."""

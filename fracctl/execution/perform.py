@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import cached_property
@@ -9,13 +10,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fracctl.execution.computation import Computation, Job
-from fracctl.execution.drawing import draw_figures
+from fracctl.execution.drawing import UNDRAWN, draw_figures
 from fracctl.execution.executors import Executors
 from fracctl.execution.progress import NoProgress, Progress
+from fracctl.execution.restoring import restore_parts
 from fracctl.execution.threads import single_threaded
 from fracctl.store import RunDirectory, directory_of
-from fracctl.store.files import make_directory, remove_tree
+from fracctl.store.files import make_directory
 from fracctl.store.lock import exclusive
+from fracctl.store.manifest import NAME
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -78,7 +81,7 @@ def perform(
     make_directory(directory.path.parent)
     with exclusive(directory.lock), single_threaded():
         if fresh or not is_whole(directory):
-            notes = _prepare(directory, fresh)
+            notes = _prepare(directory, job, fresh)
             with nullcontext(executors) if executors else Executors() as lenders:
                 Computation(job, directory, progress or NoProgress(), notes, lenders).run()
             return RunResult(directory.path, directory.run_json["summary"])
@@ -90,14 +93,31 @@ def is_whole(directory: RunDirectory) -> bool:
     return directory.has_manifest and directory.status == "finished" and not directory.verify()
 
 
-def _prepare(directory: RunDirectory, fresh: bool) -> list[str]:
-    """Leave in the directory only what can be trusted, and return notes on what could not."""
+def _prepare(directory: RunDirectory, job: Job, fresh: bool) -> list[str]:
+    """Leave in the directory only what can be trusted, and return notes on what could not.
+
+    Parts have digests of their own. A finished run has none: they come from its evaluated points where these are whole.
+    """
     damage = directory.verify() if directory.has_manifest else []
-    if fresh or damage:
+    if fresh:
         directory.set_aside()
-    else:
+    elif not damage:
         directory.remove_manifest()
-    return [f"the stored run was damaged ({damage[0]}) and has been computed again"] if damage and not fresh else []
+    elif directory.parts.exists() and directory.status != "finished":
+        directory.clear()
+    elif _is_whole(directory.evaluations_path, damage):
+        restore_parts(directory, job.survey())
+        directory.clear()
+        return [f"the stored run was damaged ({damage[0]}); all but its evaluated points has been made again"]
+    else:
+        directory.set_aside()
+        return [f"the stored run was damaged ({damage[0]}) and has been computed again"]
+    return []
+
+
+def _is_whole(path: Path, damage: Sequence[str]) -> bool:
+    """Whether a file is there, and no sentence of what is damaged is about it or the manifest."""
+    return path.is_file() and not any(line.startswith((path.name, NAME)) for line in damage)
 
 
 def stored(directory: RunDirectory) -> RunResult:
@@ -111,15 +131,13 @@ def _wants_other_figures(directory: RunDirectory, job: Job) -> bool:
 
 
 def _redrawn(directory: RunDirectory, job: Job) -> RunResult:
-    """Return a stored run with the figures asked for now."""
-    figures = job.configuration["figures"]
+    """Return a stored run with the figures asked for now; the record of them is written when they are there."""
     content = directory.run_json
-    content["configuration"]["figures"] = figures
-    remove_tree(directory.figures)
+    content["configuration"]["figures"] = job.configuration["figures"]
+    summary = content["summary"]
+    undrawn = draw_figures(directory, job.configuration["figures"])
+    summary["notes"] = [note for note in summary["notes"] if note not in summary[UNDRAWN]] + undrawn
+    summary[UNDRAWN] = undrawn
     directory.write_run_json(content)
     directory.write_manifest()
-    notes = draw_figures(directory, figures)
-    directory.write_manifest()
-    result = stored(directory)
-    result.summary["notes"] += notes
-    return result
+    return stored(directory)

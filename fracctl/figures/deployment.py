@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from fracctl.arrays import Floats
 from fracctl.errors import suggestion
 from fracctl.figures import labels
-from fracctl.figures.results import FigureError, Results, Selection, chosen
+from fracctl.figures.results import FigureError, Results, Selection, chosen, showing
 from fracctl.figures.style import CYCLE, FULL_WIDTH_IN, GREY
 
 _PANEL_HEIGHT_IN = 2.3
@@ -52,6 +52,7 @@ class _Curve:
         return abs(float(self.values[0]) - self.target) or abs(self.target)
 
 
+@showing(_WORDS)
 def build(results: Results, selection: Selection) -> tuple[Figure, pd.DataFrame]:
     """Draw a row for each initial condition: the whole run left, the approach to the target right.
 

@@ -37,13 +37,16 @@ class Drawing:
     table: pd.DataFrame
 
 
-def draw(run: RunDirectory, figures: Mapping[str, Mapping[str, Any]], remark: str = "") -> list[Path]:
+def draw(
+    run: RunDirectory, figures: Mapping[str, Mapping[str, Any]], remark: str = "", folder: Path | None = None
+) -> list[Path]:
     """Draw figures of a stored run: ``<name>.pdf``, ``<name>.png`` and the table behind them, ``<name>.csv``.
 
     Args:
         run: the run directory; nothing else is read.
         figures: file name to type and options, as in the configuration's `figures`.
         remark: what stands below each figure, e.g. that the run lacks points.
+        folder: where they are written; None for the run's own.
 
     Returns:
         The files written.
@@ -57,7 +60,7 @@ def draw(run: RunDirectory, figures: Mapping[str, Mapping[str, Any]], remark: st
     problems: list[FracctlError] = []
     for request in [_request(results, name, options) for name, options in figures.items()]:
         try:
-            written += _files(run.figures, request, results, remark)
+            written += _files(folder or run.figures, request, results, remark)
         except FigureError as problem:
             problems.append(FigureError(f"figure '{request.name}': {problem}"))
     if problems:

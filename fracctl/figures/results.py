@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeVar
 
 import pandas as pd
 
@@ -19,6 +19,7 @@ from fracctl.units import Scales
 
 Row = Mapping[str, Any]
 """A row of optima, by column."""
+_Builder = TypeVar("_Builder", bound=Callable[..., Any])
 
 _DESIGN = (
     "alpha_",
@@ -176,6 +177,21 @@ class Selection:
     def value_column(self) -> str:
         """Column of the objective in evaluations and optima."""
         return f"objective_{self.objective}"
+
+
+def showing(words: Iterable[str] | None) -> Callable[[_Builder], _Builder]:
+    """Declare what the option `shows` of a figure may be; a builder without this has no such option.
+
+    Args:
+        words: one of these; None for measures of the run, separated by commas.
+    """
+    known = None if words is None else tuple(words)
+
+    def declare(build: _Builder) -> _Builder:
+        vars(build)["shows"] = known
+        return build
+
+    return declare
 
 
 def select(results: Results, options: Mapping[str, Any]) -> Selection:

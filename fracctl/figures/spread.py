@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from fracctl.errors import suggestion
 from fracctl.figures import labels
-from fracctl.figures.results import FigureError, Results, Selection
+from fracctl.figures.results import FigureError, Results, Selection, showing
 from fracctl.figures.style import CYCLE, FULL_WIDTH_IN, GREY
 
 _PANEL_HEIGHT_IN = 2.3
@@ -17,6 +17,7 @@ _ABREAST = 3
 _MOST = 6
 
 
+@showing(None)
 def build(results: Results, selection: Selection) -> tuple[Figure, pd.DataFrame]:
     """Draw the share of samples up to each value, a panel for each measure and a curve for each law and start.
 

@@ -6,7 +6,7 @@ import hashlib
 import json
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
-from importlib.metadata import entry_points, version
+from importlib.metadata import PackageNotFoundError, entry_points, version
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,7 @@ PACKAGE = Path(__file__).parents[1]
 NOT_IN_IDENTITY = ("scheduler", "figures", "output_dir")
 """Keys of the configuration that change no number."""
 
-VERSIONS = ("numpy", "scipy")
+DECISIVE = ("numpy", "scipy", "numba", "llvmlite", "pymoo", "moocore")
 """Packages whose versions change numbers."""
 
 _KINDS = ("plants", "controllers", "solvers", "measures", "surveys")
@@ -30,10 +30,13 @@ def run_id(configuration: Mapping[str, Any], sources: str | None = None) -> str:
         configuration: plain data, resolved, the seed included.
         sources: digest of the program; default: that of the package's sources.
     """
+    several_laws = configuration.get("evaluation", {}).get("laws")
+    idle = {*NOT_IN_IDENTITY, "controller"} if several_laws else {*NOT_IN_IDENTITY}
+    configuration = {key: value for key, value in configuration.items() if key not in idle}
     what = {
-        "configuration": {key: value for key, value in configuration.items() if key not in NOT_IN_IDENTITY},
+        "configuration": configuration,
         "sources": sources_digest() if sources is None else sources,
-        "versions": {name: version(name) for name in VERSIONS},
+        "versions": {name: version_of(name) for name in DECISIVE},
     }
     if others := extensions(configuration):
         what["extensions"] = others
@@ -49,7 +52,15 @@ def extensions(configuration: Mapping[str, Any]) -> dict[str, str]:
     """Return the digests of the installed packages, by name, from which a run has its plant, laws or measures."""
     named = {*_types(configuration), *configuration.get("measures", {})}
     packages = {module.partition(".")[0] for name, module in _entry_points() if name in named}
-    return {package: _package_digest(package) for package in sorted(packages)}
+    return {package: package_digest(package) for package in sorted(packages)}
+
+
+def version_of(name: str) -> str | None:
+    """Return the version of an installed package, None where there is none."""
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return None
 
 
 def _types(data: Any) -> Iterator[str]:
@@ -69,7 +80,8 @@ def _entry_points() -> tuple[tuple[str, str], ...]:
 
 
 @cache
-def _package_digest(package: str) -> str:
+def package_digest(package: str) -> str:
+    """Return the digest of an installed package's Python sources, empty where it is not installed."""
     spec = find_spec(package)
     if spec is None or spec.origin is None:
         return ""

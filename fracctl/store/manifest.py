@@ -1,4 +1,4 @@
-"""``manifest.sha256``: the digests of all files of a finished run, as ``sha256sum --check`` reads them."""
+"""``manifest.sha256``: the digests of the files of a run that has ended, as ``sha256sum --check`` reads them."""
 
 from __future__ import annotations
 
@@ -11,10 +11,15 @@ NAME = "manifest.sha256"
 PARTS = "parts"
 REPORT = "report.html"
 """Made of a run at any time, and no part of it."""
+LOG = "run.log"
+"""Nothing is made of it; whoever writes into it changes no result."""
+NEW_FIGURES = f"figures{TEMPORARY}"
+"""Figures that are being drawn."""
+_LEFT_OUT = (NAME, PARTS, REPORT, LOG, NEW_FIGURES)
 
 
 def write(directory: Path) -> None:
-    """Write the manifest over all files but parts and the report."""
+    """Write the manifest over all files but parts, the report and the log."""
     with disk_errors(directory):
         lines = [f"{sha256(path)}  {path.relative_to(directory).as_posix()}\n" for path in _files(directory)]
     write_bytes(directory / NAME, "".join(lines).encode())
@@ -44,5 +49,5 @@ def _problem(directory: Path, line: str) -> str | None:
 def _files(directory: Path) -> Iterator[Path]:
     for path in sorted(directory.rglob("*")):
         parts = path.relative_to(directory).parts
-        if path.is_file() and parts[0] not in (NAME, PARTS, REPORT) and path.suffix != TEMPORARY:
+        if path.is_file() and parts[0] not in _LEFT_OUT and path.suffix != TEMPORARY:
             yield path

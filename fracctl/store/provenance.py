@@ -6,20 +6,20 @@ import os
 import platform
 import subprocess
 from collections.abc import Mapping
-from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
-from fracctl.store.identity import PACKAGE, VERSIONS, sources_digest
+from fracctl.store.identity import DECISIVE, PACKAGE, extensions, package_digest, sources_digest, version_of
 
-_LIBRARIES = ("fracctl", "numpy", "scipy", "pandas", "pyarrow")
+_LIBRARIES = ("fracctl", *DECISIVE, "pandas", "pyarrow")
 
 
 def provenance(configuration: Mapping[str, Any]) -> dict[str, Any]:
     """Return what does not change while the run is computed, as plain data."""
     return {
-        "versions": {"python": platform.python_version()} | {name: _version(name) for name in _LIBRARIES},
+        "versions": {"python": platform.python_version()} | {name: version_of(name) for name in _LIBRARIES},
         "commit": _commit(),
         "sources": sources_digest(),
+        "extensions": extensions(configuration),
         "platform": platform.platform(),
         "processor": platform.machine(),
         "cores": os.cpu_count(),
@@ -31,21 +31,15 @@ def differences(before: Mapping[str, Any]) -> list[str]:
     """Return what of `before`, which decides on a run's id, is not as it is now, e.g. ``numpy 2.1.0, now 2.2.0``."""
     versions = before.get("versions", {})
     found = [
-        f"{name} {versions.get(name)}, now {_version(name)}"
-        for name in VERSIONS
-        if versions.get(name) != _version(name)
+        f"{name} {versions.get(name)}, now {version_of(name)}"
+        for name in DECISIVE
+        if versions.get(name) != version_of(name)
     ]
     if before.get("sources") != sources_digest():
         commit = f" (commit {before['commit']})" if before.get("commit") else ""
         found.append(f"other sources of fracctl {versions.get('fracctl')}{commit}")
-    return found
-
-
-def _version(name: str) -> str | None:
-    try:
-        return version(name)
-    except PackageNotFoundError:
-        return None
+    given = before.get("extensions", {})
+    return found + [f"other sources of {name}" for name, digest in given.items() if digest != package_digest(name)]
 
 
 def _commit() -> str | None:

@@ -38,8 +38,9 @@ class RunDirectory:
         self.frequency_response_path = self.path / "frequency_response.parquet"
         self.trajectories_path = self.path / "trajectories.parquet"
         self.figures = self.path / "figures"
+        self.new_figures = self.path / manifest.NEW_FIGURES
         self.parts = self.path / manifest.PARTS
-        self.log = self.path / "run.log"
+        self.log = self.path / manifest.LOG
         self.report = self.path / manifest.REPORT
 
     def __repr__(self) -> str:
@@ -197,20 +198,37 @@ class RunDirectory:
         """Create the directory."""
         make_directory(self.path)
 
+    def clear(self) -> None:
+        """Delete what is made of the parts, and open the run again; ``run.json`` and the log go on."""
+        self.remove_manifest()
+        kept = (self.parts, self.log, self.path / "run.json")
+        with disk_errors(self.path):
+            for path in set(self.path.iterdir()) - set(kept):
+                remove_tree(path) if path.is_dir() else path.unlink()
+
     def set_aside(self) -> None:
-        """Make room for computing again: a finished run is kept beside until `forget_aside`, any other is deleted."""
-        if self.has_manifest:
-            remove_tree(self._aside)
-            move(self.path, self._aside)
+        """Make room for computing again: a finished run is kept beside until `forget_aside`.
+
+        One that is not finished is kept only where no other is kept already.
+        """
+        if self.has_manifest and (self.status == "finished" or not self.aside.exists()):
+            remove_tree(self.aside)
+            move(self.path, self.aside)
         else:
             remove_tree(self.path)
 
     def forget_aside(self) -> None:
         """Delete what `set_aside` kept."""
-        remove_tree(self._aside)
+        remove_tree(self.aside)
 
     @property
-    def _aside(self) -> Path:
+    def kept(self) -> list[str]:
+        """A sentence on the run that is kept beside, none where there is none."""
+        return [f"the run that was stored here before is kept in {self.aside}"] if self.aside.exists() else []
+
+    @property
+    def aside(self) -> Path:
+        """Where `set_aside` keeps a run."""
         return self.path.with_name(f".{self.path.name}.old")
 
 

@@ -186,6 +186,8 @@ def _limits(constraints: Mapping[str, float], evaluation: Evaluation) -> dict[st
 def _aims(algorithm: str, objectives: Sequence[str] | None, evaluation: Evaluation) -> list[tuple[str, ...]]:
     """Return the objectives of each search."""
     several = algorithm == NSGA2
+    if objectives is not None and not objectives:
+        raise ArgumentError("objectives", [], f"must be null or name one of {', '.join(evaluation.objectives)}")
     names = list(objectives or (evaluation.objectives if several else [evaluation.objective]))
     for name in names:
         _check_name("objectives", name, list(evaluation.objectives))

@@ -194,6 +194,30 @@ def test_all_runs_are_composed_before_the_first_starts(capsys: pytest.CaptureFix
     ]
 
 
+@pytest.mark.parametrize(
+    ("words", "cure"),
+    [
+        (["-m", "controller.alpha_w=0.9,0.95", "controller.alpha_w=1"], "; for a run with each, write -m "),
+        (["-m", "controller.alpha_w=1", "+controller.alpha_w=0.9,0.95"], "; for a run with each, write -m "),
+        (["controller.alpha_w=1", "controller.alpha_w=1"], "; for a run with each, write -m controller.alpha_w=1,1"),
+        (["~controller.alpha_w", "controller.alpha_w=1"], ""),
+    ],
+)
+def test_a_key_is_set_once(words: list[str], cure: str, capsys: pytest.CaptureFixture[str], stand_in: StandIn) -> None:
+    assert main(["run", *words]) == 3
+    assert stand_in.calls == []
+    said = capsys.readouterr().err.rstrip()
+    first, second = words[-2:]
+    assert said.startswith(f"error: controller.alpha_w is set twice, '{first}' and '{second}'; keep one of them{cure}")
+    assert cure or said.endswith("keep one of them")
+
+
+def test_a_group_is_chosen_once(capsys: pytest.CaptureFixture[str], stand_in: StandIn) -> None:
+    assert main(["run", "-m", "controller=pd", "controller=pd_alpha,pid"]) == 3
+    assert capsys.readouterr().err.startswith("error: run 1 of 2 (controller=pd_alpha): controller is chosen twice, ")
+    assert stand_in.calls == []
+
+
 def test_an_error_of_all_runs_is_told_once(capsys: pytest.CaptureFixture[str], stand_in: StandIn) -> None:
     assert main(["run", "-m", "controller.alpha_w=0.9,0.95", "controller.foo=1"]) == 3
     assert capsys.readouterr().err == "error: unknown key 'controller.foo'; allowed: type, alpha_w, k_p_w, k_d_w\n"

@@ -253,6 +253,9 @@ def test_integer_control_in_plane_goes_below_what_local_searches_find() -> None:
         (["evaluation.laws.lqr.vary=[q_x]"], "evaluation.laws.lqr.vary = q_x: must name parameters of the law"),
         (["evaluation.laws.pd.type=pdx"], "must be one of"),
         (["evaluation.widest_gain=1"], "must be no less than the largest of `gain_limits`"),
+        (["evaluation.bounds.order=[0.9,1.0]"], "evaluation.bounds.order = [0.9, 1.0]: has no meaning"),
+        (["survey.grid.gain=5"], "survey.grid.gain = 5: has no meaning"),
+        (["survey.grid.gains=1"], "survey.grid.gains = 1: must be at least 2"),
         (["survey.population=4"], "must be at least 8"),
         (["survey.evaluations=10"], "must be at least two generations"),
         (["survey.rounds=-1"], "survey.rounds = -1: must not be negative"),
@@ -262,6 +265,13 @@ def test_bad_input_gets_a_sentence(words: list[str], sentence: str) -> None:
     with pytest.raises(ConfigurationError) as refused:
         comparison_of(*words)
     assert sentence in str(refused.value)
+
+
+def test_a_grid_without_a_kind_that_a_law_varies_is_refused() -> None:
+    config = compose(["experiment=fair_outofplane", "~survey.grid.orders"])
+    with pytest.raises(ConfigurationError, match="must hold a number of orders, for pd_alpha varies alpha_w"):
+        build_checked(config)
+    build_checked(compose(["experiment=fair_outofplane", "~survey.grid.orders", "~evaluation.laws.pd_alpha"]))
 
 
 @pytest.mark.parametrize(

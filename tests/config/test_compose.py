@@ -129,6 +129,7 @@ def test_what_hydra_would_take_silently_or_say_obscurely(words: list[str], said:
         ("ic1_outofplane", "did you mean 'experiment=ic1_outofplane'?"),
         ("foo", "neither an override, KEY=VALUE"),
         ("=1", "write KEY=VALUE"),
+        ("~seed=77", "a key is removed whatever its value; write '~seed', or 'seed=77' to set it"),
         ("name='a", "cannot read"),
         ("controller.alpha_w=interval(0,1)", "has no list of values"),
     ],

@@ -111,7 +111,7 @@ TLS = ["scheduler=dask", *(f"scheduler.tls_{name}=a.pem" for name in ("ca_file",
         (["scheduler=dask", "scheduler.address=tcp://a:1", "scheduler.workers=2"], ("scheduler.workers = 2: goes "
          "without scheduler.address only; there, 'dask worker --nworkers N' says how many")),
         (["scheduler=dask", "scheduler.patience_s=0"], "scheduler.patience_s = 0: must be above 0"),
-        ([*TLS, "scheduler.address=tls://a:1", "scheduler.tls_client_key=null"],
+        ([*TLS[:-1], "scheduler.address=tls://a:1", "scheduler.tls_client_key=null"],
          "scheduler.tls_client_key = null: must be given where tls_ca_file is"),
         (["figures.a.type=pie"], f"figures.a.type = pie: must be one of {', '.join(names('figures'))}"),
         (["figures.trajectories.objective=fast"], ("figures.trajectories.objective = fast: must be one of the run's "

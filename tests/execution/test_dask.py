@@ -214,7 +214,7 @@ def test_an_executor_answers_and_raises(here: WorkerExecutor) -> None:
 
 def test_a_worker_that_joins_late_must_fit_too(here: WorkerExecutor, monkeypatch: pytest.MonkeyPatch) -> None:
     other = dask_call.program() | {"scipy": "0.1"}
-    monkeypatch.setattr(dask_call, "program", lambda: other)
+    monkeypatch.setattr(dask_call, "program", lambda packages=(): other)
     with pytest.raises(RunError, match=r"a Dask worker that has joined has scipy .* instead of 0\.1"):
         here.submit(divmod, 7, 2).result()
 

@@ -193,6 +193,73 @@ def test_a_damaged_run_is_computed_again_with_a_note(tmp_path: Path, undisturbed
     assert RunDirectory(again.run_directory).verify() == []
 
 
+def test_fresh_keeps_a_finished_run_that_a_worse_one_would_replace(tmp_path: Path, undisturbed: Path) -> None:
+    first = perform(job(tmp_path)).run_directory
+    aside = first.with_name(f".{first.name}.old")
+    kept = f"the run that was stored here before is kept in {aside}"
+    for alphas in ((0.8,), (0.8, 0.85)):
+        faults = [{"kind": "raises", "alpha_w": alpha} for alpha in alphas]
+        worse = perform(job(tmp_path, faults=faults), fresh=True)
+        assert worse.status == "incomplete"
+        assert kept in worse.summary["notes"]
+        assert tables_of(aside) == tables_of(undisturbed)
+    faults = [{"kind": "raises", "alpha_w": alpha} for alpha in (0.8, 0.85, 0.9, 0.95, 1.0)]
+    with pytest.raises(RunError, match=r"every point failed: .*; the run that was stored here before is kept in "):
+        perform(job(tmp_path, faults=faults), fresh=True)
+    assert RunDirectory(aside).verify() == []
+    better = perform(job(tmp_path))
+    assert better.status == "finished"
+    assert kept not in better.summary["notes"]
+    assert not aside.exists()
+
+
+@pytest.mark.parametrize("name", ["optima.parquet", "run.json"])
+@pytest.mark.parametrize("survey", [None, "searches"])
+def test_what_is_made_of_whole_points_is_made_again_alone(tmp_path: Path, name: str, survey: str | None) -> None:
+    one = search(tmp_path, Searches) if survey else job(tmp_path)
+    first = perform(one).run_directory
+    before = tables_of(first)
+    (first / name).write_bytes(b"{")
+    (first / "figures").mkdir()
+    watch = Watch()
+    again = perform(one, progress=watch)
+    assert not again.reused
+    assert watch.stored == watch.points > 0
+    said = f"the stored run was damaged ({name} has changed); all but its evaluated points has been made again"
+    assert again.summary["notes"][0] == said
+    assert tables_of(first) == before
+    assert RunDirectory(first).verify() == []
+    assert not (first / "parts").exists()
+    assert not (first / "figures").exists()
+
+
+def test_points_are_not_trusted_without_their_digest(tmp_path: Path) -> None:
+    first = perform(job(tmp_path)).run_directory
+    (first / "manifest.sha256").write_bytes(b"\xff")
+    watch = Watch()
+    assert not perform(job(tmp_path), progress=watch).reused
+    assert watch.stored == 0
+
+
+def test_a_line_in_the_log_changes_nothing(tmp_path: Path) -> None:
+    first = perform(job(tmp_path)).run_directory
+    with (first / "run.log").open("a") as log:
+        log.write("looked at\n")
+    assert perform(job(tmp_path)).reused
+
+
+@pytest.mark.parametrize("name", ["run.log", "optima.parquet", "run.json"])
+def test_parts_of_an_incomplete_run_outlive_other_files(tmp_path: Path, undisturbed: Path, name: str) -> None:
+    first = perform(job(tmp_path, faults=[{"kind": "raises", "alpha_w": 0.8}])).run_directory
+    with (first / name).open("a") as file:
+        file.write("touched\n")
+    watch = Watch()
+    again = perform(job(tmp_path), progress=watch)
+    assert watch.stored == (N_BLOCKS - 1) * N_POINTS // N_BLOCKS
+    assert again.status == "finished"
+    assert tables_of(first) == tables_of(undisturbed)
+
+
 @pytest.mark.parametrize("after", [1, N_POINTS // 2, N_POINTS])
 def test_an_interrupted_run_continues(tmp_path: Path, undisturbed: Path, after: int) -> None:
     watch = Watch(interrupt_after=after)

@@ -12,9 +12,11 @@ import pytest
 
 import fracctl
 from fracctl.config.compose import compose
+from fracctl.errors import RunError
 from fracctl.execution.run import RunResult, execute
 from fracctl.store import RunDirectory
 from tests.execution.test_perform import tables_of
+from tests.store.disks import full_after
 
 ROOT = Path(__file__).parents[2]
 TWO_ORDERS = ["survey.axes.alpha_w=[0.91,1.0]", "figures=[]"]
@@ -117,6 +119,33 @@ def test_other_figures_are_drawn_without_computing(tmp_path: Path) -> None:
     assert list(run.run_json["configuration"]["figures"]) != []
     assert execute(compose([*words, "figures=[]"], None)).reused
     assert not run.figures.exists()
+    assert run.verify() == []
+
+
+def test_figures_that_cannot_be_drawn_are_told_every_time(tmp_path: Path) -> None:
+    words = ["controller.k_p_w=0.85", "controller.k_d_w=2.0", f"output_dir={tmp_path}"]
+    execute(compose([*words, "figures=[]"], None))
+    asked = [execute(compose([*words, "figures=[pareto_fronts]"], None)) for _ in range(2)]
+    for result in asked:
+        (undrawn,) = result.summary["undrawn_figures"]
+        assert undrawn.startswith("figure 'pareto_fronts': ")
+        assert result.summary["notes"].count(undrawn) == 1
+    drawn = execute(compose([*words, "figures=[trajectories]"], None)).summary
+    assert drawn["undrawn_figures"] == []
+    assert undrawn not in drawn["notes"]
+
+
+def test_a_full_disk_leaves_the_figures_there_are_and_drawing_is_tried_again(tmp_path: Path) -> None:
+    words = ["controller.k_p_w=0.85", "controller.k_d_w=2.0", f"output_dir={tmp_path}"]
+    run = RunDirectory(execute(compose([*words, "figures=[trajectories]"], None)).run_directory)
+    before = {path.name: path.read_bytes() for path in run.figures.iterdir()}
+    with full_after(100), pytest.raises(RunError, match="No space left on device"):
+        execute(compose([*words, "figures=[trajectories,poles]"], None))
+    assert {path.name: path.read_bytes() for path in run.figures.iterdir()} == before
+    assert run.verify() == []
+    assert execute(compose([*words, "figures=[trajectories,poles]"], None)).reused
+    assert {path.stem for path in run.figures.iterdir()} == {"trajectories", "poles"}
+    assert not run.new_figures.exists()
     assert run.verify() == []
 
 

@@ -9,6 +9,7 @@ import pytest
 
 from fracctl.store import identity
 from fracctl.store.identity import run_id, sources_digest
+from fracctl.store.provenance import differences, provenance
 
 CONFIGURATION: dict[str, Any] = {
     "controller": {"alpha_w": 0.91, "k_p_w": 0.85},
@@ -33,11 +34,34 @@ def test_what_may_change_a_number_changes_the_id(change: dict[str, Any]) -> None
     assert run_id(CONFIGURATION | change) != run_id(CONFIGURATION)
 
 
+def test_a_controller_beside_laws_changes_no_id() -> None:
+    other = {"controller": {"alpha_w": 0.5}}
+    several = CONFIGURATION | {"evaluation": {"laws": {"pd": {"type": "pd"}}}}
+    assert run_id(several | other) == run_id(several)
+    alone = CONFIGURATION | {"evaluation": {"laws": {}}}
+    assert run_id(alone | other) != run_id(alone)
+
+
 def test_sources_and_versions_change_the_id(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     before = run_id(CONFIGURATION)
     assert run_id(CONFIGURATION, sources="other") != before
     monkeypatch.setattr(identity, "version", lambda name: "0.0")
     assert run_id(CONFIGURATION) != before
+
+
+@pytest.mark.parametrize("name", ["numpy", "scipy", "numba", "llvmlite", "pymoo", "moocore"])
+def test_the_version_of_every_package_that_computes_changes_the_id(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    before, found = run_id(CONFIGURATION), provenance(CONFIGURATION)
+    assert differences(found) == []
+    known = identity.version
+    monkeypatch.setattr(identity, "version", lambda other: "0.0" if other == name else known(other))
+    assert run_id(CONFIGURATION) != before
+    assert differences(found) == [f"{name} {found['versions'][name]}, now 0.0"]
+
+
+def test_another_extension_is_told() -> None:
+    found = provenance(CONFIGURATION) | {"extensions": {"pitch_package": "0"}}
+    assert differences(found) == ["other sources of pitch_package"]
 
 
 def test_the_digest_sees_names_and_contents(tmp_path: Path) -> None:

@@ -46,7 +46,10 @@ def test_a_whole_run_verifies_and_so_says_sha256sum(run: RunDirectory) -> None:
     )
 
 
-def test_parts_and_later_files_are_not_in_the_manifest(run: RunDirectory) -> None:
+def test_parts_the_log_and_later_files_are_not_in_the_manifest(run: RunDirectory) -> None:
+    run.log.write_text("said")
+    run.write_manifest()
+    run.log.write_text("more")
     (run.parts / "000000.parquet").unlink()
     (run.path / "report.html").write_text("later")
     assert run.verify() == []
