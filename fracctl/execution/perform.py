@@ -115,6 +115,7 @@ def _redrawn(directory: RunDirectory, job: Job) -> RunResult:
     figures = job.configuration["figures"]
     content = directory.run_json
     content["configuration"]["figures"] = figures
+    content["command"] = job.command or content.get("command")
     remove_tree(directory.figures)
     directory.write_run_json(content)
     directory.write_manifest()

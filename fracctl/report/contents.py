@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import re
-import shlex
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import pandas as pd
@@ -15,7 +13,6 @@ import yaml
 
 from fracctl.config.build import build_checked
 from fracctl.config.compose import to_yaml
-from fracctl.config.repeat import overrides_for
 from fracctl.errors import FracctlError, RunError
 from fracctl.figures import drawing
 from fracctl.report.numbers import count
@@ -49,7 +46,7 @@ class Picture:
 
 
 @dataclass(frozen=True)
-class Command:
+class Again:
     """How a run is repeated."""
 
     text: str
@@ -182,23 +179,30 @@ def configuration_text(run: StoredRun) -> str:
     return yaml.safe_dump(run.configuration, sort_keys=False, allow_unicode=True)
 
 
-def command(run: StoredRun, config_dir: Path | None) -> Command:
-    """Return the command that repeats a run, with its overrides found from the configuration."""
+def command(run: StoredRun) -> Again:
+    """Return the command that started a run, and what it gives now."""
     if run.config is None:
-        return Command("", "The configuration is of another version of fracctl, which does not read it any more.")
-    words = overrides_for(run.config, config_dir)
-    if words is None:
-        return Command("", "No overrides lead to this configuration; it stands below in full.")
-    place = [] if config_dir is None else ["--config-dir", str(config_dir)]
-    return Command(shlex.join(["fracctl", "run", *place, *words]), _identity(run))
+        return Again("", "The configuration is of another version of fracctl, which does not read it any more.")
+    if run.command is None:
+        return Again("", "The run was stored without its command; its configuration stands below in full.")
+    lost = run.command.lost
+    return Again(run.command.line, f"It gives another run now: {lost}." if lost else _given(run))
 
 
-def _identity(run: StoredRun) -> str:
+def _given(run: StoredRun) -> str:
     """Whether the command gives the same run id here, or why it does not."""
     assert run.config is not None
-    if run_id(run.config.model_dump(mode="json")) == run.run_id:
+    assert run.command is not None
+    try:
+        found = run_id(run.command.compose().model_dump(mode="json"))
+    except FracctlError as problem:
+        return f"It gives no run any more: {problem}."
+    named = f" {run.command.study} is the study." if run.command.study else ""
+    if found == run.run_id:
         stored = "--fresh computes it again" if run.status == "finished" else "it goes on from there"
-        return f"It gives the run id {run.run_id}; where that run is stored, {stored}."
+        return f"It gives the run id {run.run_id}; where that run is stored, {stored}.{named}"
+    if found != run_id(run.config.model_dump(mode="json")):
+        return "It gives another configuration now, for files that it names have changed since."
     other = run.provenance.get("sources") != sources_digest()
     why = "of fracctl" if other else "of NumPy or SciPy"
     return (

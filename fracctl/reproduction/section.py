@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from decimal import Decimal
 from pathlib import Path
 
+from fracctl.config.command import Command
 from fracctl.config.compose import compose
 from fracctl.config.schemas import RunConfig
 from fracctl.errors import RunError
@@ -104,17 +105,20 @@ def reproduce(
     for sampling, words in settings.items():
         for name in wanted.experiments:
             display = progress(f"{name}, {sampling}") if progress else None
-            config = compose([f"experiment={name}", *words, *overrides])
+            chosen = [f"experiment={name}", *words, *overrides]
+            config = compose(chosen)
             drawn = config.model_copy(update={"figures": {}}) if words else config
-            runs[sampling][name] = _run(name, drawn, display, executors)
+            runs[sampling][name] = _run(name, drawn, Command.of(chosen), display, executors)
     sampled, exact = (_optima(wanted, runs[sampling]) for sampling in SAMPLINGS)
     rows = tuple(_row(published, recipe, sampled, exact) for published, recipe in suite.rows(section))
     output = runs[EXACT][wanted.experiment].run_directory.parents[1]
     return Reproduction(suite.name, section, wanted.title, rows, runs, output / "reproduce" / suite.name / section)
 
 
-def _run(experiment: str, config: RunConfig, progress: Progress | None, executors: Executors | None) -> RunResult:
-    result = execute(config, progress=progress, executors=executors)
+def _run(
+    experiment: str, config: RunConfig, command: Command, progress: Progress | None, executors: Executors | None
+) -> RunResult:
+    result = execute(config, command, progress=progress, executors=executors)
     if error := result.summary.get("error"):
         raise RunError(f"{experiment}: {error}")
     return result

@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 
 from fracctl.cli.main import main
+from fracctl.config.command import Command
 from fracctl.config.compose import compose
 from fracctl.execution.run import RunResult, execute
 from fracctl.report.page import comparison_page, run_page
@@ -74,6 +75,10 @@ SLOW_KINDS = {
 }
 
 
+def computed(words: list[str]) -> RunResult:
+    return execute(compose(words), Command.of(words))
+
+
 def page_of(directory: Path) -> Page:
     return Page(run_page(StoredRun.read(directory)))
 
@@ -100,7 +105,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def grid(tmp_path_factory: pytest.TempPathFactory) -> RunResult:
     folder = tmp_path_factory.mktemp("grid")
-    return execute(compose([*KINDS["grid"][0], "figures=gain_contours", f"output_dir={folder}"]))
+    return computed([*KINDS["grid"][0], "figures=gain_contours", f"output_dir={folder}"])
 
 
 @pytest.fixture
@@ -119,8 +124,8 @@ def change(directory: Path, **content: Any) -> None:
 @pytest.mark.parametrize("kind", [*KINDS, *(pytest.param(kind, marks=pytest.mark.slow) for kind in SLOW_KINDS)])
 def test_a_report_of_each_kind_of_run(kind: str, folder: Path) -> None:
     words, sentence = (KINDS | SLOW_KINDS)[kind]
-    config = compose([*words, f"output_dir={folder}"])
-    result = execute(config)
+    config = compose(words)
+    result = computed([*words, f"output_dir={folder}"])
     page = page_of(result.run_directory)
     check_form(page)
     assert re.search(sentence, page.result), page.result
@@ -255,6 +260,47 @@ def test_a_configuration_that_does_not_fit_any_more_is_shown_all_the_same(stored
     assert "orbits" in page.result
 
 
+def test_a_run_stored_without_its_command_says_so(stored: Path) -> None:
+    change(stored, command=None)
+    page = page_of(stored)
+    assert page.commands == []
+    assert "stored without its command" in " ".join(page.sections["again"])
+
+
+def test_words_that_lead_elsewhere_by_now_say_so(stored: Path) -> None:
+    command = StoredRun.read(stored).content["command"]
+    change(stored, command=command | {"words": [*command["words"], "seed=7"]})
+    assert "It gives another configuration now" in " ".join(page_of(stored).sections["again"])
+    change(stored, command=command | {"words": [*command["words"], "sede=7"]})
+    assert "It gives no run any more: unknown key 'sede'" in " ".join(page_of(stored).sections["again"])
+
+
+def test_the_command_of_a_study_names_it_and_tells_of_its_changes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Composing happens once: the command is what was typed, and not searched for."""
+    monkeypatch.chdir(tmp_path)
+    file = tmp_path / "my_study.yaml"
+    file.write_text("name: mine\ncontroller:\n  alpha_w: 0.93\n", encoding="utf-8")
+    words = ["my_study", "controller.k_p_w=0.7", "scheduler=serial", "figures=null"]
+    assert main(["run", *words]) == 0
+    (directory,) = (tmp_path / "outputs" / "mine").iterdir()
+    monkeypatch.chdir("/")
+    count = Counter[str]()
+    composed = Command.compose
+    monkeypatch.setattr(Command, "compose", lambda own: (count.update(["composed"]), composed(own))[1])
+    page = page_of(directory)
+    assert count == {"composed": 1}
+    assert page.commands == [["fracctl", "run", *words[:2], "figures=null"]]
+    said = " ".join(page.sections["again"])
+    assert f"It gives the run id {directory.name}" in said
+    assert f"{file} is the study" in said
+    file.write_text("name: mine\ncontroller:\n  alpha_w: 0.94\n", encoding="utf-8")
+    assert f"{file} has changed since" in " ".join(page_of(directory).sections["again"])
+    file.unlink()
+    assert f"{file} is not there any more" in " ".join(page_of(directory).sections["again"])
+
+
 def test_text_of_a_run_is_text_on_the_page(stored: Path, grid: RunResult) -> None:
     note = "<script>alert(1)</script> & 'quotes'"
     change(stored, summary=grid.summary | {"notes": [note]})
@@ -265,17 +311,8 @@ def test_text_of_a_run_is_text_on_the_page(stored: Path, grid: RunResult) -> Non
 
 
 def test_runs_side_by_side(grid: RunResult, folder: Path) -> None:
-    slower = execute(
-        compose(
-            [
-                "experiment=ic1_outofplane",
-                *GRID,
-                "survey.axes.k_d_w=[1.5,1.6]",
-                "figures=gain_contours",
-                f"output_dir={folder}",
-            ]
-        )
-    )
+    other = ["survey.axes.k_d_w=[1.5,1.6]", "figures=gain_contours", f"output_dir={folder}"]
+    slower = computed(["experiment=ic1_outofplane", *GRID, *other])
     runs = [StoredRun.read(result.run_directory) for result in (grid, slower)]
     page = Page(comparison_page(runs))
     check_form(page)
@@ -317,7 +354,7 @@ def test_runs_of_different_experiments_are_compared_in_what_they_share(grid: Run
         (["empty", "empty"], "'empty' is named twice"),
         (["experiment=tether"], "takes directories of runs, not the override"),
         (["outputs/one/0123", "--to", "empty"], "--to empty is a directory; name a file in it, as empty/report.html"),
-        (["--config", "x"], "unknown option '--config'; did you mean '--config-dir'?"),
+        (["--jsn"], "unknown option '--jsn'; did you mean '--json'?"),
     ],
 )
 def test_what_is_no_run_gets_a_sentence(
