@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import ast
 import doctest
+import os
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 import tomllib
@@ -141,6 +143,32 @@ def test_dask_is_installed_before_it_is_started() -> None:
     before = README.partition("\ndask scheduler")[0]
     assert "pip install '.[dask]'" in before
     assert "dask" in PROJECT["optional-dependencies"]
+
+
+@pytest.mark.parametrize("key", ["version", "version_info"])
+def test_make_takes_no_other_interpreter_than_the_one_named(key: str, tmp_path: Path) -> None:
+    if shutil.which("make") is None:
+        pytest.skip("needs make")
+    shutil.copy(ROOT / "Makefile", tmp_path)
+    shutil.copy(ROOT / "pyproject.toml", tmp_path)
+    environment = {name: value for name, value in os.environ.items() if name not in ("PYTHON", "MAKEFLAGS")}
+
+    def make(*words: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            ["make", "--dry-run", *words], cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
+        )
+
+    named, own = f"PYTHON={sys.executable}", ".".join(map(str, sys.version_info[:2]))
+    assert f"{sys.executable} -m venv .venv" in make(named, "lint").stdout, "there is none yet"
+    (tmp_path / ".venv" / "bin").mkdir(parents=True)
+    (tmp_path / ".venv" / "bin" / "python").touch()
+    for version, code in ((f"{own}.0", 0), ("3.99.1", 2)):
+        (tmp_path / ".venv" / "pyvenv.cfg").write_text(f"home = x\n{key} = {version}\n", encoding="utf-8")
+        assert make("lint").returncode == 0
+        assert make(named, "clean").returncode == 0
+        done = make(named, "lint")
+        assert done.returncode == code, done.stderr
+    assert f".venv has Python 3.99, but {sys.executable} is {own}; run 'make clean' first" in done.stderr
 
 
 def test_documents_name_targets_that_exist() -> None:
