@@ -8,9 +8,10 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import pandas as pd
+import pyarrow as pa
 import yaml
 
+from fracctl.arrays import Array
 from fracctl.config.build import build_checked
 from fracctl.config.compose import to_yaml
 from fracctl.errors import FracctlError, RunError
@@ -18,8 +19,9 @@ from fracctl.figures import drawing
 from fracctl.report.numbers import count
 from fracctl.report.pictures import inline
 from fracctl.report.stored import StoredRun
-from fracctl.report.tables import Table, of_frame, of_records, upright
+from fracctl.report.tables import MOST_ROWS, Table, of_frame, of_records, upright
 from fracctl.report.words import explain
+from fracctl.store import tables as stored_tables
 from fracctl.store.identity import run_id, sources_digest
 
 _NOT_OF_THE_RUN = ("scheduler", "figures", "stored in")
@@ -136,20 +138,28 @@ def _slices(run: StoredRun) -> Iterator[Table]:
 
 
 def _evaluated(run: StoredRun) -> Iterator[Table]:
-    """The evaluated points, the best ones first where there is an objective."""
-    rows = run.directory.evaluations()
-    words = ", ".join(f"{number} {word}" for word, number in Counter(rows["status"]).most_common())
-    column = f"objective_{run.configuration['objective']}"
-    ranked = column in rows
-    if ranked:
-        rows = _ranked(rows, column)
-    best_by = run.configuration["objective"] if ranked else ""
-    yield of_frame(f"Evaluated points: {count(len(rows), 'row')}, {words}", rows, "evaluations.parquet", best_by)
+    """The evaluated points, the best ones first where there is an objective; only those that are shown are held."""
+    best_by = str(run.configuration["objective"])
+    column = f"objective_{best_by}"
+    words, shown = Counter[str](), None
+    for piece in stored_tables.stream(run.directory.evaluations_path):
+        words.update(piece.column("status").to_pylist())
+        rows = piece if shown is None else pa.concat_tables([shown, piece])
+        shown = rows.take(_best(rows, column)) if column in rows.column_names else rows.slice(0, MOST_ROWS)
+    if shown is None:
+        return
+    if column not in shown.column_names:
+        best_by = ""
+    total = words.total()
+    caption = f"Evaluated points: {count(total, 'row')}, {', '.join(f'{n} {word}' for word, n in words.most_common())}"
+    yield of_frame(caption, stored_tables.to_pandas(shown), "evaluations.parquet", best_by, total)
 
 
-def _ranked(rows: pd.DataFrame, column: str) -> pd.DataFrame:
-    good = rows["status"].eq("ok") & ~rows["stable"].eq(False).fillna(False)
-    return rows.assign(_bad=~good).sort_values(["_bad", column], kind="stable").drop(columns="_bad")
+def _best(rows: pa.Table, column: str) -> Array:
+    """Places of the best rows, first those that may be optima."""
+    frame = stored_tables.to_pandas(rows.select(["status", "stable", column]))
+    frame["bad"] = ~(frame["status"].eq("ok") & ~frame["stable"].eq(False).fillna(False))
+    return frame.sort_values(["bad", column], kind="stable").index[:MOST_ROWS].to_numpy()
 
 
 def pictures(run: StoredRun, prefix: str) -> tuple[list[Picture], list[str]]:

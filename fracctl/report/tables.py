@@ -86,7 +86,7 @@ def cell(value: Any, column: str = "") -> Cell:
     return Cell(number(int(value) if isinstance(value, numbers.Integral) else float(value), _DIGITS), float(value))
 
 
-def of_frame(caption: str, frame: pd.DataFrame, whole: str, best_by: str = "") -> Table:
+def of_frame(caption: str, frame: pd.DataFrame, whole: str, best_by: str = "", of: int | None = None) -> Table:
     """Return a stored table, without columns that are empty, cut where it is long.
 
     Args:
@@ -94,6 +94,7 @@ def of_frame(caption: str, frame: pd.DataFrame, whole: str, best_by: str = "") -
         frame: rows in the order in which they are shown.
         whole: file that holds all of it.
         best_by: objective by which they are ordered; empty where they are in no order.
+        of: number of rows of the stored table, where `frame` holds the first of them only.
     """
     filled = frame.dropna(axis="columns", how="all")
     names = [str(name) for name in filled.columns]
@@ -101,7 +102,7 @@ def of_frame(caption: str, frame: pd.DataFrame, whole: str, best_by: str = "") -
         [cell(value, name) for name, value in zip(names, row, strict=True)]
         for row in filled.head(MOST_ROWS).itertuples(index=False)
     ]
-    return _table(caption, names, rows, _cut(rows, len(frame), whole, best_by))
+    return _table(caption, names, rows, _cut(rows, of or len(frame), whole, best_by))
 
 
 def of_records(caption: str, records: Sequence[Mapping[str, Any]], whole: str) -> Table:

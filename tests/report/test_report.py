@@ -10,16 +10,21 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 from fracctl.cli.main import main
 from fracctl.config.command import Command
 from fracctl.config.compose import compose
 from fracctl.execution.run import RunResult, execute
+from fracctl.report import contents
 from fracctl.report.page import comparison_page, run_page
 from fracctl.report.stored import StoredRun
 from fracctl.report.tables import MOST_ROWS
-from fracctl.store import RunDirectory
+from fracctl.store import RunDirectory, tables
 from fracctl.store.identity import run_id
 from tests.comparison.test_comparison import FEW
 from tests.configs.test_files import TINY, TINY_FLIGHT, TINY_SEARCH, TINY_SETTINGS
@@ -160,6 +165,39 @@ def test_a_long_table_is_cut_to_the_best_and_says_where_all_is(grid: RunResult) 
     assert [float(row[head.index("settling_time")]) for row in shown] == pytest.approx(best.tolist(), rel=1e-5)
     remark = f"These are the best {MOST_ROWS} of {len(rows)} rows by settling_time; all are in evaluations.parquet."
     assert remark in page.texts["remark"]
+
+
+def test_of_a_long_table_only_what_is_shown_is_held(stored: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Row groups of ten, points that failed or are unstable first among them; the best come from all of them."""
+    path = stored / "evaluations.parquet"
+    table = pq.read_table(path)
+    n = table.num_rows
+    columns = {name: table.column(name).to_pylist() for name in ("status", "stable")}
+    columns["status"][::2] = ["failed"] * len(range(0, n, 2))
+    columns["stable"][3::11] = [False] * len(range(3, n, 11))
+    for name, values in columns.items():
+        place = table.column_names.index(name)
+        table = table.set_column(place, table.schema.field(name), pa.array(values, table.schema.field(name).type))
+    pq.write_table(table, path, row_group_size=10, write_page_checksum=True)
+    held = []
+    whole = tables.to_pandas
+    monkeypatch.setattr(tables, "to_pandas", lambda rows: (held.append(rows.num_rows), whole(rows))[1])
+    (shown,) = contents._evaluated(StoredRun.read(stored))
+    assert max(held) <= MOST_ROWS + 10 < n
+    rows = whole(table)
+    good = rows["status"].eq("ok") & rows["stable"].ne(False).fillna(True)
+    assert 0 < good.sum() < MOST_ROWS
+    first = rows[good].sort_values("settling_time", kind="stable")
+    others = rows[~good].sort_values("settling_time", kind="stable")
+    expected = pd.concat([first, others]).head(MOST_ROWS)
+    names = [column.name for column in shown.columns]
+    for name in ("k_d_w", "k_p_w", "alpha_w", "settling_time"):
+        keys = [row[names.index(name)].key for row in shown.rows]
+        np.testing.assert_array_equal(np.array(keys, float), expected[name].to_numpy(float))
+    counted = rows["status"].value_counts()
+    assert shown.caption.startswith(f"Evaluated points: {n} rows, ")
+    assert all(f"{number} {word}" in shown.caption for word, number in counted.items())
+    assert f"the best {MOST_ROWS} of {n} rows by settling_time" in shown.remark
 
 
 def test_columns_have_their_units(folder: Path) -> None:
