@@ -30,8 +30,9 @@ _OF_THE_PAPER = re.compile(r" \(Figures? [^)]*\)")
 _AFTER_THE_MEASURES = "objective"
 _ALWAYS = ("status", "stable", "error_estimate", "dominant_pole_real", "dominant_pole_imag")
 """What a table of optima shows beside design variables, measures and the objective."""
-_CAPTIONS = {
-    "laws": "The laws side by side",
+LAWS = "laws"
+CAPTIONS = {
+    LAWS: "The laws side by side",
     "comparison": "Every law at its best, by start, limit and band",
     "survival": "What survives: settling of each law, stage by stage",
     "quantiles": "Quantiles over dispersed runs, with intervals of 95 % confidence",
@@ -118,8 +119,8 @@ def shown_point(run: StoredRun, objective: str, row: Mapping[str, Any]) -> dict[
 def _concluded(run: StoredRun) -> Iterator[Table]:
     """The tables of the evaluation, with the columns that the summary holds."""
     for name, records in run.tables.items():
-        caption, whole = _CAPTIONS.get(name, name), f"{name}.csv and {name}.parquet"
-        if name != "laws" or not records:
+        caption, whole = CAPTIONS.get(name, name), f"{name}.csv and {name}.parquet"
+        if name != LAWS or not records:
             yield of_records(caption, records, whole)
             continue
         for condition in dict.fromkeys(record["initial_condition"] for record in records):

@@ -380,6 +380,71 @@ def test_runs_of_different_experiments_are_compared_in_what_they_share(grid: Run
     assert "No two of these runs have a result for the same objective" in " ".join(apart.sections["shared"])
 
 
+def law(condition: str, name: str, orbits: float | None, **more: Any) -> dict[str, Any]:
+    return {"initial_condition": condition, "law": name, "settling_orbits": orbits} | more
+
+
+def spread_of(condition: str, name: str, measure: str, median: float) -> dict[str, Any]:
+    return {"initial_condition": condition, "law": name, "measure": measure, "samples": 40, "median": median}
+
+
+def survived(condition: str, name: str, stage: str, orbits: float | None) -> dict[str, Any]:
+    return {"initial_condition": condition, "law": name, "stage": stage, "band_m": 100.0, "median_orbits": orbits}
+
+
+def compared(condition: str, limit: float, name: str, objective: float) -> dict[str, Any]:
+    keys = {"initial_condition": condition, "limit": "gain", "limit_value": limit, "threshold_m": 10.0, "law": name}
+    return keys | {"objective": objective, "verdict": "better"}
+
+
+def test_tables_of_laws_are_joined(stored: Path, grid: RunResult) -> None:
+    """The same law, start, stage or measure of several runs stand together; a run alone with one has it alone."""
+    other = stored.with_name("0123456789ab")
+    shutil.copytree(stored, other)
+    one = {
+        "laws": [law("ic1", "pd", 0.5), law("ic1", "lqr", None), law("ic2", "pd", 0.7)],
+        "quantiles": [spread_of("ic1", "pd", "effort", 1.0), spread_of("ic1", "pd", "overshoot", 2.0)],
+        "survival": [survived("ic1", "pd", "ideal", 0.25), survived("ic1", "pd", "sampled", None)],
+        "comparison": [compared("ic1", 4.0, "pd", 3.0), compared("ic1", 8.0, "pd", 2.0)],
+        "alone": [{"initial_condition": "ic1"}],
+    }
+    two = {
+        "laws": [law("ic1", "pd", 0.25, delta_v_m_s=12.0), law("ic1", "pid", 0.9)],
+        "quantiles": [spread_of("ic1", "pd", "effort", 1.5)],
+        "survival": [survived("ic1", "pd", "ideal", 0.5)],
+        "comparison": [compared("ic1", 8.0, "pd", 2.5)],
+    }
+    for directory, tables_of_run in ((stored, one), (other, two)):
+        change(directory, summary=grid.summary | {"tables": tables_of_run})
+    page = Page(comparison_page([StoredRun.read(stored), StoredRun.read(other)]))
+    check_form(page)
+    captions = [str(table["caption"]) for table in page.tables]
+    assert len([caption for caption in captions if caption.startswith("The laws side by side")]) == 2
+    assert page.table("The laws side by side, from ic1") == [
+        ["quantity", "unit", "A: pd", "B: pd", "A: lqr", "B: pid"],
+        ["settling_orbits", "orbits", "0.5", "0.25", "never", "0.9"],
+        ["delta_v_m_s", "m/s", "–", "12", "–", "–"],
+    ]
+    assert page.table("The laws side by side, from ic2")[0] == ["quantity", "unit", "A: pd"]
+    assert page.table("Quantiles over dispersed runs") == [
+        ["initial_condition", "law", "measure", "run", "samples", "median"],
+        ["ic1", "pd", "effort", "A", "40", "1"],
+        ["ic1", "pd", "effort", "B", "40", "1.5"],
+        ["ic1", "pd", "overshoot", "A", "40", "2"],
+    ]
+    assert [row[2:4] + row[-1:] for row in page.table("What survives")[1:]] == [
+        ["ideal", "A", "0.25"],
+        ["ideal", "B", "0.5"],
+        ["sampled", "A", "never"],
+    ]
+    assert [[row[2], *row[5:7]] for row in page.table("Every law at its best")[1:]] == [
+        ["4", "A", "3"],
+        ["8", "A", "2"],
+        ["8", "B", "2.5"],
+    ]
+    assert not any("alone" in caption for caption in captions)
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
