@@ -10,7 +10,7 @@ from typing import Any, NoReturn
 import numpy as np
 
 from fracctl.arrays import Array, Booleans, Floats
-from fracctl.comparison.laws import LARGEST_GAIN, LOGARITHMIC, Law, LawEvaluation, SettlingTimes, varied_of
+from fracctl.comparison.laws import LARGEST_GAIN, LOGARITHMIC, Law, LawEvaluation, TimesWithin, varied_of
 from fracctl.comparison.problems import GAIN, PEAK, Problem, objective_within, settling_time_within
 from fracctl.controllers.linear import ModelBasedLaw
 from fracctl.controllers.parameters import Parameter
@@ -173,7 +173,7 @@ class ComparisonEvaluation(Evaluation):
         others = [measure for measure in self.measures if measure.columns != (_SETTLING_TIME,)]
         names = [measure.name for measure in others]
         needed: tuple[Any, ...] = (ControlEffort(), PeakAcceleration())
-        return (SettlingTimes(bands), *others, *(measure for measure in needed if measure.name not in names))
+        return (TimesWithin(bands), *others, *(measure for measure in needed if measure.name not in names))
 
     def peak(self, problem: Problem) -> float:
         """Return the dimensionless peak acceleration that a problem allows, infinite where it limits gains."""

@@ -16,7 +16,7 @@ from fracctl.execution.executors import Executors
 from fracctl.execution.progress import Progress
 from fracctl.execution.run import RunResult, execute
 from fracctl.reproduction.published import REPRODUCED, UNITS, WORDS, PublishedRow
-from fracctl.reproduction.recipes import Optima, Recipe
+from fracctl.reproduction.recipes import Recipe, RunOptima
 from fracctl.reproduction.suites import Section, Suite
 from fracctl.reproduction.verdicts import judge
 
@@ -124,11 +124,11 @@ def _run(
     return result
 
 
-def _optima(section: Section, runs: Mapping[str, RunResult]) -> Optima:
-    return Optima(section.points, {name: run.optima for name, run in runs.items()}, section.experiment)
+def _optima(section: Section, runs: Mapping[str, RunResult]) -> RunOptima:
+    return RunOptima(section.points, {name: run.optima for name, run in runs.items()}, section.experiment)
 
 
-def _row(published: PublishedRow, recipe: Recipe, sampled: Optima, exact: Optima) -> Row:
+def _row(published: PublishedRow, recipe: Recipe, sampled: RunOptima, exact: RunOptima) -> Row:
     numbers = (optima.number(recipe) for optima in (sampled, exact))
     computed, truth = (None if number is None else number / UNITS[published.unit] for number in numbers)
     verdict = judge(published, computed)
