@@ -10,7 +10,7 @@ from fracctl.report.contents import Picture, pictures
 from fracctl.report.stored import StoredRun
 from fracctl.report.tables import Cell, Column, Table, cell
 from fracctl.reproduction.published import UNITS, WORDS
-from fracctl.reproduction.recipes import RunOptima, Recipe
+from fracctl.reproduction.recipes import Recipe, RunOptima
 from fracctl.reproduction.section import EXACT, SAMPLED, Reproduction, Row
 from fracctl.reproduction.suites import Section, Suite, read_suite, suite_names
 from fracctl.reproduction.table import cells, conclusion
