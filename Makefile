@@ -8,6 +8,17 @@ BIN := $(VENV)/bin
 export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
 
+# An interpreter that is named must be the one that the environment has.
+ifneq ($(origin PYTHON),file)
+ifeq ($(filter clean,$(MAKECMDGOALS)),)
+HAS := $(shell sed -nE 's/^version(_info)? = ([0-9]+[.][0-9]+).*/\2/p' $(VENV)/pyvenv.cfg 2>/dev/null)
+WANTED := $(shell $(PYTHON) -c 'import sys; print("%d.%d" % sys.version_info[:2])')
+ifneq ($(filter-out $(WANTED),$(HAS)),)
+$(error $(VENV) has Python $(HAS), but $(PYTHON) is $(or $(WANTED),not there); run 'make clean' first, or leave PYTHON out)
+endif
+endif
+endif
+
 .PHONY: demo test test-slow lint format bench reproduce docs clean
 
 demo: $(VENV)/installed

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -61,13 +62,15 @@ FRONT_DOORS = (PACKAGE / "__init__.py", PACKAGE / "__main__.py")
 
 
 def imported_names(tree: ast.AST) -> Iterator[tuple[int, str]]:
-    """Line and dotted name of everything imported anywhere in a module, inside functions too."""
+    """Line and dotted name of everything imported anywhere in a module, inside functions and by `import_module` too."""
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             yield from ((node.lineno, alias.name) for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
             assert node.level == 0, f"line {node.lineno}: relative import"
             yield from ((node.lineno, f"{node.module}.{alias.name}") for alias in node.names)
+        elif isinstance(node, ast.Call) and ast.unparse(node.func).endswith("import_module"):
+            yield from ((node.lineno, word.value) for word in node.args if isinstance(word, ast.Constant))
 
 
 def room(dotted: str) -> str | None:
@@ -93,6 +96,28 @@ def upward_imports(source: str, own_room: str) -> list[str]:
     return found
 
 
+def dotted(path: Path) -> str:
+    """``fracctl.store`` of ``fracctl/store/__init__.py``."""
+    return ".".join(path.relative_to(PACKAGE.parent).with_suffix("").parts).removesuffix(".__init__")
+
+
+def circle(sources: Mapping[str, str]) -> list[str]:
+    """Modules that import each other in a circle, the first one again at its end; empty where there is none.
+
+    Imports inside functions and those for types alone count: what they hide is a circle all the same.
+    """
+    graph = {}
+    for module, source in sources.items():
+        names = [name for _, name in imported_names(ast.parse(source))]
+        targets = {name if name in sources else name.rpartition(".")[0] for name in names}
+        graph[module] = (targets & {*sources}) - {module}
+    try:
+        TopologicalSorter(graph).prepare()
+    except CycleError as error:
+        return list(error.args[1])
+    return []
+
+
 def test_every_room_has_its_place() -> None:
     assert existing_rooms() <= set(BOTTOM_UP), "a new room needs a place in BOTTOM_UP and in DESIGN"
 
@@ -101,6 +126,13 @@ def test_every_room_has_its_place() -> None:
 def test_imports_point_downwards(path: Path) -> None:
     own_room = path.relative_to(PACKAGE).parts[0].removesuffix(".py")
     assert upward_imports(path.read_text(encoding="utf-8"), own_room) == []
+
+
+def test_no_modules_import_each_other() -> None:
+    """Rooms have an order, so a circle lies inside one of them; the front doors have none to import them."""
+    assert circle({dotted(path): path.read_text(encoding="utf-8") for path in MODULES}) == []
+    benchmarks = sorted((PACKAGE.parent / "benchmarks").rglob("*.py"))
+    assert circle({dotted(path): path.read_text(encoding="utf-8") for path in benchmarks}) == []
 
 
 @pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(PACKAGE)))
@@ -134,3 +166,32 @@ def test_an_upward_import_is_seen(line: str) -> None:
 @pytest.mark.parametrize("line", ["from fracctl.arrays import Floats", "from fracctl import errors", "import numpy"])
 def test_a_downward_import_is_allowed(line: str) -> None:
     assert upward_imports(line, "fractional") == []
+
+
+@pytest.mark.parametrize(
+    "back",
+    [
+        "from fracctl.store.files import write",
+        "import fracctl.store.files",
+        "from fracctl.store import files",
+        "def f():\n    from fracctl.store.files import write",
+        "if TYPE_CHECKING:\n    from fracctl.store.files import write",
+        "files = importlib.import_module('fracctl.store.files')",
+    ],
+)
+def test_a_circle_inside_a_room_is_seen(back: str) -> None:
+    sources = {
+        "fracctl.store": "from fracctl.store.files import write",
+        "fracctl.store.files": "from fracctl.store.parts import Part\nfrom fracctl.errors import RunError",
+        "fracctl.store.parts": "import numpy\nfrom fracctl.store.lock import held",
+        "fracctl.store.lock": "",
+    }
+    assert circle(sources) == []
+    found = circle(sources | {"fracctl.store.lock": back})
+    assert set(found) == {"fracctl.store.files", "fracctl.store.parts", "fracctl.store.lock"}
+    assert found[0] == found[-1]
+
+
+def test_a_module_that_imports_its_own_room_is_a_circle() -> None:
+    door = {"fracctl.store": "from fracctl.store.files import write"}
+    assert circle(door | {"fracctl.store.files": "from fracctl.store import write"}) != []

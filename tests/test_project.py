@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import ast
 import doctest
+import os
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 import tomllib
@@ -27,6 +29,7 @@ INDEX_ADDRESSES = "|".join(
 )
 
 
+MAKEFILE = (ROOT / "Makefile").read_text(encoding="utf-8")
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 SHELL = "".join(re.findall(r"```sh\n(.*?)```", README, flags=re.DOTALL))
 README_COMMANDS = [shlex.split(line, comments=True)[1:] for line in SHELL.splitlines() if line.startswith("fracctl ")]
@@ -45,10 +48,9 @@ def tracked_text() -> list[tuple[str, str]]:
 
 
 def make_targets() -> set[str]:
-    text = (ROOT / "Makefile").read_text(encoding="utf-8")
-    (phony,) = re.findall(r"^\.PHONY: (.*)$", text, flags=re.MULTILINE)
+    (phony,) = re.findall(r"^\.PHONY: (.*)$", MAKEFILE, flags=re.MULTILINE)
     targets = set(phony.split())
-    assert targets == {target for target in targets if re.search(rf"^{target}:", text, flags=re.MULTILINE)}
+    assert targets == {target for target in targets if re.search(rf"^{target}:", MAKEFILE, flags=re.MULTILINE)}
     return targets
 
 
@@ -116,6 +118,57 @@ def test_changelog_follows_its_form() -> None:
     assert all(re.fullmatch(r"\[\d+\.\d+\.\d+\] - \d{4}-\d{2}-\d{2}", section) for section in sections[1:])
     kinds = set(re.findall(r"^### (.*)$", text, flags=re.MULTILINE))
     assert kinds <= {"Added", "Changed", "Deprecated", "Removed", "Fixed", "Security"}
+
+
+@pytest.mark.parametrize("name", ["README.md", "docs/first_hour.md"])
+def test_documents_say_how_a_shell_comes_to_know_the_command(name: str, tmp_path: Path) -> None:
+    """The line is there before the first command, and works with what `make demo` sets up."""
+    text = (ROOT / name).read_text(encoding="utf-8")
+    (line,) = dict.fromkeys(re.findall(r"\. \S+/activate", text))
+    first = next(re.finditer(r"^```\w+\n(\$ )?fracctl ", text, flags=re.MULTILINE))
+    assert text.index(line) < first.start()
+    assert "pip install .\n" in text or "pip install . " in text
+    assert line.split("/")[0] == f". {re.findall(r'^VENV := (.*)$', MAKEFILE, flags=re.MULTILINE)[0]}"
+    if not (Path(sys.prefix) / "bin" / "activate").exists():
+        pytest.skip("not in an environment")
+    (tmp_path / ".venv").symlink_to(sys.prefix)
+    script = f"{line} && command -v fracctl"
+    done = subprocess.run(
+        ["bash", "-c", script], cwd=tmp_path, env={"PATH": "/usr/bin:/bin"}, capture_output=True, check=False
+    )
+    assert done.returncode == 0, done.stderr.decode()
+
+
+def test_dask_is_installed_before_it_is_started() -> None:
+    before = README.partition("\ndask scheduler")[0]
+    assert "pip install '.[dask]'" in before
+    assert "dask" in PROJECT["optional-dependencies"]
+
+
+@pytest.mark.parametrize("key", ["version", "version_info"])
+def test_make_takes_no_other_interpreter_than_the_one_named(key: str, tmp_path: Path) -> None:
+    if shutil.which("make") is None:
+        pytest.skip("needs make")
+    shutil.copy(ROOT / "Makefile", tmp_path)
+    shutil.copy(ROOT / "pyproject.toml", tmp_path)
+    environment = {name: value for name, value in os.environ.items() if name not in ("PYTHON", "MAKEFLAGS")}
+
+    def make(*words: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            ["make", "--dry-run", *words], cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
+        )
+
+    named, own = f"PYTHON={sys.executable}", ".".join(map(str, sys.version_info[:2]))
+    assert f"{sys.executable} -m venv .venv" in make(named, "lint").stdout, "there is none yet"
+    (tmp_path / ".venv" / "bin").mkdir(parents=True)
+    (tmp_path / ".venv" / "bin" / "python").touch()
+    for version, code in ((f"{own}.0", 0), ("3.99.1", 2)):
+        (tmp_path / ".venv" / "pyvenv.cfg").write_text(f"home = x\n{key} = {version}\n", encoding="utf-8")
+        assert make("lint").returncode == 0
+        assert make(named, "clean").returncode == 0
+        done = make(named, "lint")
+        assert done.returncode == code, done.stderr
+    assert f".venv has Python 3.99, but {sys.executable} is {own}; run 'make clean' first" in done.stderr
 
 
 def test_documents_name_targets_that_exist() -> None:

@@ -12,7 +12,7 @@ import numpy as np
 import symengine
 from jitcdde import jitcdde, t, y
 
-from benchmarks.delays import DELAY, ORBITS, Floats, free_motion, free_rates
+from benchmarks.orbits import DELAY, ORBITS, Floats, free_motion, free_rates
 
 _C22 = 0.052
 

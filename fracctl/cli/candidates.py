@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import re
 from collections.abc import Iterable, Iterator, Mapping
 from itertools import pairwise
 from pathlib import Path
@@ -11,7 +10,7 @@ from types import ModuleType
 from typing import Any
 
 from fracctl.cli.parser import Parser
-from fracctl.config.catalogue import Catalogue, built_in_directory, catalogue
+from fracctl.config.catalogue import Catalogue, catalogue
 from fracctl.config.keys import dotted, settings
 from fracctl.config.registry import BUILT_IN, names
 from fracctl.config.studies import studies_here, study_file
@@ -151,10 +150,11 @@ def _options(found: Catalogue, group: str) -> list[Candidate]:
 
 
 def _papers() -> Iterator[str]:
-    for path in sorted((built_in_directory().parent / "experiments").glob("*/suite.yaml")):
-        yield path.parent.name
-        sections = re.findall(r"^  (\w+):$", path.read_text(encoding="utf-8"), flags=re.MULTILINE)
-        yield from (f"{path.parent.name}/{section}" for section in sections)
+    from fracctl.reproduction.suites import read_suite, suite_names
+
+    for name in suite_names():
+        yield name
+        yield from (f"{name}/{section}" for section in read_suite(name).sections)
 
 
 def _beginning(typed: str, known: Iterable[Candidate]) -> list[Candidate]:

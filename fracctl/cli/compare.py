@@ -95,6 +95,7 @@ def _computed(words: Sequence[str], options: argparse.Namespace) -> Iterator[tup
     """Yield label and summary of every run that studies and overrides ask for."""
     from fracctl.cli.progress import display
     from fracctl.config.build import build_checked
+    from fracctl.config.command import Command
     from fracctl.config.compose import compose, expand_multirun
     from fracctl.config.studies import study_file
     from fracctl.execution.executors import Executors
@@ -102,17 +103,17 @@ def _computed(words: Sequence[str], options: argparse.Namespace) -> Iterator[tup
 
     studies = [word for word in words if study_file(word) is not None]
     overrides = [word for word in words if word not in studies]
-    jobs: list[tuple[str, RunConfig]] = []
+    jobs: list[tuple[str, RunConfig, Command]] = []
     for chosen in [[study] for study in studies] or [[]]:
         for job in expand_multirun([*chosen, *overrides], options.config_dir):
             varied = [word for word in job if word not in overrides and (word not in chosen or len(studies) > 1)]
             config = compose(job, options.config_dir)
             build_checked(config)
-            jobs.append((" ".join(varied), config))
+            jobs.append((" ".join(varied), config, Command.of(job, options.config_dir)))
     with Executors() as executors:
-        for label, config in jobs:
+        for label, config, command in jobs:
             summary = execute_run(
-                config, progress=display(label or config.name, options.quiet), executors=executors
+                config, command, progress=display(label or config.name, options.quiet), executors=executors
             ).summary
             if summary.get("error"):
                 raise FracctlError(f"{label or config.name}: {summary['error']}")

@@ -36,7 +36,6 @@ def parser() -> Parser:
     parser.add_argument(
         "--json", action="store_true", help="one JSON object with the file and the runs, and nothing else"
     )
-    parser.add_config_dir()
     return parser
 
 
@@ -49,9 +48,9 @@ def execute(options: argparse.Namespace) -> int:
 
     runs = [StoredRun.read(path) for path in paths]
     if len(runs) == 1:
-        target, page = options.to or runs[0].directory.report, run_page(runs[0], options.config_dir)
+        target, page = options.to or runs[0].directory.report, run_page(runs[0])
     else:
-        target, page = options.to or Path(COMPARISON), comparison_page(runs, options.config_dir)
+        target, page = options.to or Path(COMPARISON), comparison_page(runs)
     write(target, page)
     if options.json:
         named = [str(run.directory.path) for run in runs]

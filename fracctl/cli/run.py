@@ -78,7 +78,9 @@ def _run(job: Job, options: argparse.Namespace, executors: Executors) -> Ended:
     return compute_and_show(
         job,
         options,
-        lambda progress: execute_run(job.config, fresh=options.fresh, progress=progress, executors=executors),
+        lambda progress: execute_run(
+            job.config, job.command, fresh=options.fresh, progress=progress, executors=executors
+        ),
     )
 
 
@@ -130,6 +132,7 @@ def _write_summary(path: Path, jobs: Sequence[Job], ended: Sequence[Ended]) -> l
 def _jobs(options: argparse.Namespace) -> list[Job]:
     """Compose and validate every run."""
     from fracctl.config.build import build_checked
+    from fracctl.config.command import Command
     from fracctl.config.compose import compose, expand_multirun
     from fracctl.config.messages import InvalidConfiguration
 
@@ -137,7 +140,7 @@ def _jobs(options: argparse.Namespace) -> list[Job]:
     if not options.multirun:
         config = compose(overrides, options.config_dir)
         build_checked(config)
-        return [Job(config)]
+        return [Job(config, Command.of(overrides, options.config_dir))]
     jobs: list[Job] = []
     problems: list[tuple[str, str]] = []
     expanded = expand_multirun(overrides, options.config_dir)
@@ -148,7 +151,8 @@ def _jobs(options: argparse.Namespace) -> list[Job]:
             config = compose(words, options.config_dir)
             evaluation, _ = build_checked(config)
             pairs = (word.lstrip("+").partition("=") for word in varied)
-            jobs.append(Job(config, label, {key: value for key, _, value in pairs}, evaluation.plant.scales))
+            command = Command.of(words, options.config_dir)
+            jobs.append(Job(config, command, label, {key: value for key, _, value in pairs}, evaluation.plant.scales))
         except ConfigurationError as error:
             problems += [(label, line) for line in str(error).splitlines()]
     if problems:

@@ -17,6 +17,7 @@ from fracctl.cli.table import ResultTable
 from fracctl.errors import FracctlError
 
 if TYPE_CHECKING:
+    from fracctl.config.command import Command
     from fracctl.config.schemas import RunConfig
     from fracctl.execution.perform import RunResult
     from fracctl.execution.progress import Progress
@@ -36,6 +37,8 @@ class Job:
     """One run of the command line."""
 
     config: RunConfig
+    command: Command | None = None
+    """Whose words lead to it; None where a stored run is continued."""
     label: str = ""
     """``run 2 of 3 (experiment=…): ``, empty for a single run."""
     varied: Mapping[str, str] = field(default_factory=dict)

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from fracctl.arrays import Array, Floats
-from fracctl.comparison.evaluation import PART, ComparisonEvaluation
+from fracctl.comparison.compared import ComparedLaws
 from fracctl.comparison.laws import LARGEST_GAIN
-from fracctl.comparison.problems import Problem, settling_time_within
+from fracctl.comparison.problems import PART, Problem, settling_time_within
 from fracctl.design.open_loop import least_effort
 from fracctl.evaluation import Evaluation
 from fracctl.measures import PeakAcceleration
@@ -46,7 +46,7 @@ class OpenLoopBounds:
 
     def __call__(self, evaluation: Evaluation, starts: Mapping[str, Floats]) -> dict[str, Array]:
         """Return a row for each case: its time as the settling time, the peak, the least control effort."""
-        assert isinstance(evaluation, ComparisonEvaluation)
+        assert isinstance(evaluation, ComparedLaws)
         state = evaluation.initial_conditions[self.initial_condition]
         found = [least_effort(evaluation.plant, state, case.time, case.peak, _SEGMENTS) for case in self.cases]
         count = len(self.cases)

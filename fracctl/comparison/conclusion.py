@@ -10,10 +10,10 @@ import numpy as np
 
 from fracctl.arrays import Array, Floats, joined
 from fracctl.comparison.bounds import BOUND
-from fracctl.comparison.evaluation import LAW, OPEN_LOOP, PART, ComparisonEvaluation
+from fracctl.comparison.compared import ComparedLaws
 from fracctl.comparison.findings import findings
 from fracctl.comparison.laws import LARGEST_GAIN
-from fracctl.comparison.problems import Problem, settling_time_within
+from fracctl.comparison.problems import LAW, OPEN_LOOP, PART, Problem, settling_time_within
 from fracctl.comparison.robustness import AXES, HORIZON, INTERIOR, WORST
 from fracctl.comparison.searches import GRID, ONWARD, SEARCHED
 from fracctl.comparison.selection import Selection
@@ -37,7 +37,7 @@ NOTHING = "none"
 """Verdict of a law without an admissible point."""
 
 
-def conclude(comparison: ComparisonEvaluation, parts: Iterable[Mapping[str, Array]]) -> Conclusion:
+def conclude(comparison: ComparedLaws, parts: Iterable[Mapping[str, Array]]) -> Conclusion:
     """Return the table: for every initial condition, limit and band a row for each law, and the bound as the last."""
     table = _Table(comparison, joined(list(parts)))
     records = [
@@ -51,7 +51,7 @@ def conclude(comparison: ComparisonEvaluation, parts: Iterable[Mapping[str, Arra
 
 
 class _Table:
-    def __init__(self, comparison: ComparisonEvaluation, rows: Mapping[str, Array]) -> None:
+    def __init__(self, comparison: ComparedLaws, rows: Mapping[str, Array]) -> None:
         self._comparison, self._rows = comparison, rows
         self._selection = Selection(comparison, rows)
         scales = comparison.plant.scales

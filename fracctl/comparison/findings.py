@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from fracctl.comparison.evaluation import OPEN_LOOP, ComparisonEvaluation
-from fracctl.comparison.problems import MOST_GRID_VARIABLES
+from fracctl.comparison.compared import ComparedLaws
+from fracctl.comparison.problems import MOST_GRID_VARIABLES, OPEN_LOOP
 from fracctl.comparison.robustness import HALF_WIDTHS
 from fracctl.comparison.statistics import BETTER, EQUAL, UNDECIDED, WORSE, verdict
 
@@ -20,7 +20,7 @@ _MOST_NAMED = 6
 """Problems that are named one by one."""
 
 
-def findings(comparison: ComparisonEvaluation, records: Sequence[Record]) -> Iterator[str]:
+def findings(comparison: ComparedLaws, records: Sequence[Record]) -> Iterator[str]:
     """Yield sentences on the table: where fractional orders help, which law is the best, what is left undecided."""
     problems = _problems(records)
     fractional = [name for name in comparison.laws if _is_fractional(comparison, name)]
@@ -57,12 +57,12 @@ def _problems(records: Sequence[Record]) -> dict[tuple[Any, ...], dict[str, Reco
     return problems
 
 
-def _is_fractional(comparison: ComparisonEvaluation, name: str) -> bool:
+def _is_fractional(comparison: ComparedLaws, name: str) -> bool:
     return any(parameter.kind == "order" for parameter in comparison.law_of(name).varied)
 
 
 def _against_reference(
-    comparison: ComparisonEvaluation, name: str, problems: Mapping[tuple[Any, ...], Mapping[str, Record]]
+    comparison: ComparedLaws, name: str, problems: Mapping[tuple[Any, ...], Mapping[str, Record]]
 ) -> str:
     parts = []
     for band in comparison.thresholds_m:
@@ -99,7 +99,7 @@ def _against_integer(
     )
 
 
-def _nearby(comparison: ComparisonEvaluation, problems: Mapping[tuple[Any, ...], Mapping[str, Record]]) -> str:
+def _nearby(comparison: ComparedLaws, problems: Mapping[tuple[Any, ...], Mapping[str, Record]]) -> str:
     """Return how much worse the best points become nearby, and which law is the best at its worst."""
     medians = []
     for name in comparison.laws:

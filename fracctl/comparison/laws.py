@@ -23,7 +23,7 @@ LOGARITHMIC = ("time", "weight")
 """Kinds of parameters that are searched over on a logarithmic scale."""
 
 
-class SettlingTimes:
+class TimesWithin:
     """Settling times to several bands, one column each; see `fracctl.measures.SettlingTime`.
 
     Args:

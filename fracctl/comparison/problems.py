@@ -1,10 +1,15 @@
-"""The problems that laws are compared on: a settling band and a limit, for each initial condition."""
+"""The problems that laws are compared on, a settling band and a limit for each start, and what tells rows apart."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Literal
 
+LAW, PART, LIMIT = "law", "part", "limit"
+KEYS = (LAW, PART, LIMIT, "limit_value", "threshold_m", "start", "horizon_periods")
+"""Columns that say what a row is: a law, which part of the study, the problem, the start, the horizon."""
+OPEN_LOOP = "open_loop"
+"""The law of rows that bound all laws."""
 GAIN, PEAK = "gain", "peak"
 MOST_GRID_VARIABLES = 3
 """Laws with more parameters have no grid."""

@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fracctl.arrays import Array, Floats, joined
+from fracctl.comparison.compared import ComparedLaws
 from fracctl.comparison.descent import descend, neighbours
-from fracctl.comparison.evaluation import PART, ComparisonEvaluation
 from fracctl.comparison.laws import LawEvaluation
-from fracctl.comparison.problems import Problem
+from fracctl.comparison.problems import PART, Problem
 from fracctl.comparison.searches import START
 from fracctl.controllers.parameters import Parameter
 from fracctl.evaluation import Evaluation
@@ -44,7 +44,7 @@ class Robustness:
 
     def __call__(self, evaluation: Evaluation, starts: Mapping[str, Floats]) -> dict[str, Array]:
         """Return the points, over the horizons of the report too, then the worst of each part."""
-        assert isinstance(evaluation, ComparisonEvaluation)
+        assert isinstance(evaluation, ComparedLaws)
         law = evaluation.law_of(self.law)
         alone = {self.initial_condition: evaluation.initial_conditions[self.initial_condition]}
         plain = replace(law.by_gains, initial_conditions=alone)
@@ -97,7 +97,7 @@ class Robustness:
 class _Table:
     """Rows of one law, part by part."""
 
-    def __init__(self, comparison: ComparisonEvaluation, study: Robustness, plain: LawEvaluation) -> None:
+    def __init__(self, comparison: ComparedLaws, study: Robustness, plain: LawEvaluation) -> None:
         self._comparison, self._study, self._plain = comparison, study, plain
         self._parts: list[dict[str, Array]] = []
 

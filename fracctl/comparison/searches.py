@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fracctl.arrays import Array, Floats, joined
-from fracctl.comparison.evaluation import PART, ComparisonEvaluation, sound
+from fracctl.comparison.compared import ComparedLaws, sound
 from fracctl.comparison.laws import Law, LawEvaluation
 from fracctl.comparison.populations import adapt, evolve
-from fracctl.comparison.problems import Problem
+from fracctl.comparison.problems import PART, Problem
 from fracctl.evaluation import Evaluation
 from fracctl.measures.final_distance import FinalDistance
 from fracctl.surveys.base import EVALUATIONS_SPENT, POINT, SEARCHED_FOR
@@ -63,7 +63,7 @@ class Evolution:
             ]
         )
 
-    def first_points(self, comparison: ComparisonEvaluation, law: Law) -> Floats:
+    def first_points(self, comparison: ComparedLaws, law: Law) -> Floats:
         """Return a Latin hypercube sample of the box of each start and problem, (s p, population, n).
 
         Searches of different laws share the values of the variables they share.
@@ -112,7 +112,7 @@ class _Known:
     """The best points that each start knows for each problem; see `fracctl.comparison.populations.Shared`."""
 
     def __init__(
-        self, comparison: ComparisonEvaluation, law: Law, condition: str, problems: Sequence[Problem], starts: int
+        self, comparison: ComparedLaws, law: Law, condition: str, problems: Sequence[Problem], starts: int
     ) -> None:
         self._comparison, self._law, self._problems, self._starts = comparison, law, problems, starts
         self._condition = condition
@@ -206,7 +206,7 @@ class GridSearch:
 
 
 def table_rows(
-    comparison: ComparisonEvaluation,
+    comparison: ComparedLaws,
     law: Law,
     initial_condition: str,
     points: Floats,
@@ -224,13 +224,13 @@ def edges(box: Sequence[Variable]) -> tuple[Floats, Floats]:
     return np.array([variable.lower for variable in box]), np.array([variable.upper for variable in box])
 
 
-def of(evaluation: Evaluation) -> ComparisonEvaluation:
+def of(evaluation: Evaluation) -> ComparedLaws:
     """Return an evaluation as the comparison that it is."""
-    assert isinstance(evaluation, ComparisonEvaluation)
+    assert isinstance(evaluation, ComparedLaws)
     return evaluation
 
 
-def _told(comparison: ComparisonEvaluation, rows: Mapping[str, Array], problems: Sequence[Problem]) -> Floats:
+def _told(comparison: ComparedLaws, rows: Mapping[str, Array], problems: Sequence[Problem]) -> Floats:
     """Return what a search for each problem minimises, finite for every row, (p, n)."""
     solved = sound(rows)
     told = []

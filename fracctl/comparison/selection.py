@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from fracctl.arrays import Array, Floats
-from fracctl.comparison.evaluation import LAW, PART, ComparisonEvaluation
+from fracctl.comparison.compared import ComparedLaws
 from fracctl.comparison.laws import extends
-from fracctl.comparison.problems import Problem
+from fracctl.comparison.problems import LAW, PART, Problem
 from fracctl.comparison.searches import GRID, ONWARD, SEARCHED
 
 FOUND_BY = (SEARCHED, GRID, ONWARD)
@@ -31,7 +31,7 @@ class Selection:
         rows: of the table.
     """
 
-    def __init__(self, comparison: ComparisonEvaluation, rows: Mapping[str, Array]) -> None:
+    def __init__(self, comparison: ComparedLaws, rows: Mapping[str, Array]) -> None:
         self._comparison, self._rows = comparison, rows
         candidates = np.isin(rows[PART], FOUND_BY)
         laws = [comparison.law_of(law) for law in comparison.laws]

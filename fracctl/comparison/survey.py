@@ -10,9 +10,10 @@ import numpy as np
 
 from fracctl.arrays import Array, Floats
 from fracctl.comparison.bounds import BOUND, CURVE, Case, OpenLoopBounds
-from fracctl.comparison.evaluation import LAW, OPEN_LOOP, PART, ComparisonEvaluation, check_kind
+from fracctl.comparison.compared import check_kind
+from fracctl.comparison.evaluation import ComparisonEvaluation
 from fracctl.comparison.laws import Law
-from fracctl.comparison.problems import MOST_GRID_VARIABLES, PEAK, Problem, settling_time_within
+from fracctl.comparison.problems import LAW, MOST_GRID_VARIABLES, OPEN_LOOP, PART, PEAK, Problem, settling_time_within
 from fracctl.comparison.robustness import Robustness
 from fracctl.comparison.searches import START, Evolution, GridSearch, Onward
 from fracctl.comparison.selection import Selection

@@ -71,15 +71,24 @@ def catalogue(config_dir: Path | None = None, study: Path | None = None) -> Cata
     Raises:
         ConfigurationError: a directory does not exist, or the study has the name of an experiment.
     """
-    if config_dir is None and os.environ.get(OWN_DIRECTORY):
-        config_dir = Path(os.environ[OWN_DIRECTORY])
-    own = [] if config_dir is None else [_existing(config_dir)]
-    found = Catalogue((*own, built_in_directory(), *_extensions()))
+    own = own_directory(config_dir)
+    found = Catalogue((*([] if own is None else [own]), built_in_directory(), *_extensions()))
     if study is None:
         return found
     if study.stem in found.options("experiment"):
         raise ConfigurationError(f"'{study.name}' has the name of an experiment that there is already; rename the file")
     return replace(found, study=study)
+
+
+def own_directory(config_dir: Path | None = None) -> Path | None:
+    """The user's directory, absolute: the one given, or that of the environment; None if there is none.
+
+    Raises:
+        ConfigurationError: it does not exist.
+    """
+    if config_dir is None and os.environ.get(OWN_DIRECTORY):
+        config_dir = Path(os.environ[OWN_DIRECTORY])
+    return None if config_dir is None else _existing(config_dir)
 
 
 def built_in_directory() -> Path:

@@ -133,9 +133,13 @@ def survey(value: Any, info: ValidationInfo, built_in: Mapping[str, type[Typed]]
     """A survey; the axes of a grid are checked against the law's parameters."""
     value = plain(value)
     factory = factory_of("surveys", value)
-    if value["type"] not in built_in:
-        return typed_options_of(factory, omitted=("evaluation", "seed")).model_validate(value)
-    options = built_in[value["type"]].model_validate(value)
+    own = value["type"] not in built_in
+    schema = typed_options_of(factory, omitted=("evaluation", "seed")) if own else built_in[value["type"]]
+    if _LIMITS in value and _LIMITS not in schema.model_fields:
+        raise refuse(refusal((_LIMITS,), value[_LIMITS], _LIMITS_OF_THE_RUN, "sentence"))
+    options = schema.model_validate(value)
+    if own:
+        return options
     parameters = parameters_of(info.data)
     if value["type"] == "grid":
         lines = _grid_lines(options.model_dump(), parameters)
@@ -155,6 +159,10 @@ def setting_lines(resolutions: Mapping[str, Sequence[float]]) -> list[InitErrorD
         except ArgumentError as error:
             lines.append(refusal((name,), list(values), f"{error.allowed}, but holds {error.value}"))
     return lines
+
+
+_LIMITS = "constraints"
+_LIMITS_OF_THE_RUN = "limits belong to the run, not to its survey; set 'constraints.COLUMN=\"<= NUMBER\"'"
 
 
 def plant_of(data: Mapping[str, Any]) -> LinearPlant | None:

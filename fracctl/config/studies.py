@@ -20,7 +20,7 @@ def study_file(word: str) -> Path | None:
     Raises:
         UsageError: the file has a name that cannot stand for an experiment.
     """
-    if "=" in word or word.startswith("~"):
+    if not may_be_study(word):
         return None
     path = Path(word if word.endswith(ENDING) else f"{word}{ENDING}")
     if not path.is_file():
@@ -28,6 +28,11 @@ def study_file(word: str) -> Path | None:
     if not _NAME.fullmatch(path.stem):
         raise UsageError(f"'{path.name}': {_ALLOWED}; rename the file")
     return path.absolute()
+
+
+def may_be_study(word: str) -> bool:
+    """Whether a word is no override."""
+    return "=" not in word and not word.startswith("~")
 
 
 def new_study(word: str) -> Path:

@@ -50,6 +50,8 @@ class Job:
     """The evaluation."""
     survey: Callable[[], Survey]
     """Makes the survey."""
+    command: Mapping[str, Any] | None = None
+    """What started it, plain data; recorded only. None where nothing is known of it."""
 
 
 class Computation:
@@ -72,7 +74,7 @@ class Computation:
         self._survey = job.survey()
         self._scheduler = job.configuration["scheduler"]
         directory.create()
-        self._record = Record(directory, job.configuration)
+        self._record = Record(directory, job.configuration, job.command)
         self._metadata = {
             "fracctl.configuration": canonical_json(job.configuration),
             "fracctl.provenance": canonical_json(self._record.provenance),

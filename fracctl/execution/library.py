@@ -6,6 +6,7 @@ import warnings
 from collections.abc import Sequence
 from pathlib import Path
 
+from fracctl.config.command import Command
 from fracctl.config.compose import compose
 from fracctl.config.studies import study_file
 from fracctl.errors import IncompleteRunWarning
@@ -31,7 +32,8 @@ def run(experiment: str, overrides: Sequence[str] = (), *, config_dir: str | Pat
     default = [] if chosen else ["scheduler=serial"]
     chosen_run = experiment if study_file(experiment) else f"experiment={experiment}"
     arguments = [chosen_run, *default, *overrides]
-    result = execute(compose(arguments, None if config_dir is None else Path(config_dir)))
+    directory = None if config_dir is None else Path(config_dir)
+    result = execute(compose(arguments, directory), Command.of(arguments, directory))
     if error := result.summary.get("error"):
         warnings.warn(f"{experiment}: {error}", IncompleteRunWarning, stacklevel=2)
     return result

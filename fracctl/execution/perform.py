@@ -134,6 +134,7 @@ def _redrawn(directory: RunDirectory, job: Job) -> RunResult:
     """Return a stored run with the figures asked for now; the record of them is written when they are there."""
     content = directory.run_json
     content["configuration"]["figures"] = job.configuration["figures"]
+    content["command"] = job.command or content.get("command")
     summary = content["summary"]
     undrawn = draw_figures(directory, job.configuration["figures"])
     summary["notes"] = [note for note in summary["notes"] if note not in summary[UNDRAWN]] + undrawn

@@ -22,13 +22,18 @@ class Record:
     Args:
         directory: of the run.
         configuration: plain data.
+        command: that started it; None for the one of the computation that this one continues.
     """
 
-    def __init__(self, directory: RunDirectory, configuration: Mapping[str, Any]) -> None:
+    def __init__(
+        self, directory: RunDirectory, configuration: Mapping[str, Any], command: Mapping[str, Any] | None = None
+    ) -> None:
         self._directory = directory
         self._configuration = dict(configuration)
         self.run_id = run_id(configuration)
-        before = directory.run_json.get("provenance", {}) if directory.status else {}
+        content = directory.run_json if directory.status else {}
+        self._command = command or content.get("command")
+        before = content.get("provenance", {})
         self._wall_time_s = float(before.get("wall_time_s", 0.0))
         self._cpu_time_s = float(before.get("cpu_time_s", 0.0))
         self._started = (time.perf_counter(), time.process_time())
@@ -46,6 +51,7 @@ class Record:
         content = {
             "status": status,
             "run_id": self.run_id,
+            "command": self._command,
             "configuration": self._configuration,
             "provenance": self.provenance | times,
             "summary": summary,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from fracctl.config.build import build_evaluation, build_survey
+from fracctl.config.command import Command
 from fracctl.config.schemas import RunConfig
 from fracctl.execution.computation import Job
 from fracctl.execution.executors import Executors
@@ -16,6 +17,7 @@ __all__ = ["RunResult", "execute"]
 
 def execute(
     config: RunConfig,
+    command: Command | None = None,
     *,
     fresh: bool = False,
     directory: RunDirectory | None = None,
@@ -26,6 +28,7 @@ def execute(
 
     Args:
         config: what to compute and where to store it.
+        command: whose words lead to it, for a report; None where it is not known, or a stored run is continued.
         fresh: compute again what is stored.
         directory: where it is stored; None for where the configuration says.
         progress: is told how far the run is.
@@ -37,5 +40,6 @@ def execute(
     """
     plain = config.model_dump(mode="json")
     work = Work.of("fracctl.execution.configured:evaluation_of", plain)
-    job = Job(plain, work, lambda: build_survey(config, build_evaluation(config)))
+    started = None if command is None else command.model_dump(mode="json")
+    job = Job(plain, work, lambda: build_survey(config, build_evaluation(config)), started)
     return perform(job, fresh=fresh, directory=directory, progress=progress, executors=executors)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
@@ -27,12 +29,12 @@ def build(results: Results, selection: Selection) -> tuple[Figure, pd.DataFrame]
     Raises:
         FigureError: the run is not dispersed, or has no such measure.
     """
-    rows = results.evaluations
-    if "sample" not in rows:
+    if "sample" not in results.columns:
         raise FigureError("the run is not dispersed")
     measures = _measures(results, selection)
-    groups = ["initial_condition", *(["law"] if "law" in rows else [])]
-    own = rows[rows["initial_condition"].isin(selection.initial_conditions)]
+    groups = ["initial_condition", *(["law"] if "law" in results.columns else [])]
+    wanted = {"initial_condition": selection.initial_conditions}
+    own = results.run.evaluations_where(wanted, list(dict.fromkeys(["sample", *groups, *measures])))
     lines = -(-len(measures) // _ABREAST)
     width = min(_ABREAST, len(measures))
     figure = Figure(figsize=(FULL_WIDTH_IN, _PANEL_HEIGHT_IN * lines + 0.3), layout="constrained")
@@ -48,25 +50,27 @@ def build(results: Results, selection: Selection) -> tuple[Figure, pd.DataFrame]
         ax.set_ylabel("Share of samples")
     handles, names = axes[0].get_legend_handles_labels()
     figure.legend(handles, names, loc="outside lower center", ncols=min(len(names), 4))
-    return figure, own[["sample", *groups, *measures]].reset_index(drop=True)
+    return figure, own
 
 
 def _measures(results: Results, selection: Selection) -> list[str]:
-    rows = results.evaluations
     if selection.shows:
         wanted = [name.strip() for name in selection.shows.split(",")]
-        if missing := [name for name in wanted if name not in rows]:
-            raise FigureError(
-                f"the run does not measure {', '.join(missing)}{suggestion(missing[0], list(map(str, rows)))}"
-            )
+        if missing := [name for name in wanted if name not in results.columns]:
+            raise FigureError(f"the run does not measure {', '.join(missing)}{suggestion(missing[0], results.columns)}")
         return wanted
-    after = list(rows.columns).index("sample") + 1
-    numbers = rows.columns[after:]
+    after = results.columns[results.columns.index("sample") + 1 :]
     drawn = set(results.configuration["evaluation"].get("dispersions", {})) | {"error_estimate", "nodes"}
-    varying = [n for n in numbers if n not in drawn and rows[n].dtype == float and rows[n].nunique() > 2]
-    if not varying:
+    varying = (name for name in after if name not in drawn and _varies(results, name))
+    found = list(itertools.islice(varying, _MOST))
+    if not found:
         raise FigureError("no measure of the run varies")
-    return varying[:_MOST]
+    return found
+
+
+def _varies(results: Results, name: str) -> bool:
+    values = results.run.evaluations([name])[name]
+    return values.dtype == float and values.nunique() > 2
 
 
 def _steps(ax: Axes, values: np.ndarray, colour: str, name: str) -> None:

@@ -7,12 +7,14 @@ from dataclasses import dataclass
 from typing import Any
 
 from fracctl.config.messages import shown
-from fracctl.report.contents import Picture, pictures, shown_point
+from fracctl.report.contents import CAPTIONS, LAWS, Picture, pictures, shown_point
 from fracctl.report.sentences import result
 from fracctl.report.stored import StoredRun
 from fracctl.report.tables import Cell, Column, Table, cell, of_records, upright
 from fracctl.store.identity import NOT_IN_IDENTITY
 
+_LAST_KEYS = {"comparison": "law", "survival": "stage", "quantiles": "measure"}
+"""The last of the columns, by table, that say what a row is."""
 _LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
 
 
@@ -28,6 +30,9 @@ class LabelledRun:
     def short(self) -> str:
         """The letter alone."""
         return self.label.partition(":")[0]
+
+
+_Labelled = tuple[LabelledRun, Mapping[str, Any]]
 
 
 def labelled(runs: Sequence[StoredRun]) -> list[LabelledRun]:
@@ -99,12 +104,37 @@ def _side_by_side(objective: str, condition: str, entries: Sequence[tuple[Labell
 
 
 def _concluded(runs: Sequence[LabelledRun]) -> Iterator[Table]:
-    """Tables of evaluations that several runs have, one after the other."""
+    """Tables of evaluations that several runs have, joined."""
     names = [name for entry in runs for name in entry.run.tables]
     for name in dict.fromkeys(name for name in names if names.count(name) > 1):
-        for entry in runs:
-            if records := entry.run.tables.get(name):
-                yield of_records(f"{entry.label}: {name}", records, f"{name}.csv of the run")
+        records = [(entry, record) for entry in runs for record in entry.run.tables.get(name, ())]
+        if name != LAWS:
+            yield _joined(name, records)
+            continue
+        for condition in dict.fromkeys(record["initial_condition"] for _, record in records):
+            yield _laws(condition, [pair for pair in records if pair[1]["initial_condition"] == condition])
+
+
+def _laws(condition: str, records: Sequence[_Labelled]) -> Table:
+    """A column for each law of each run; the same law of several runs stands together."""
+    laws = dict.fromkeys(record["law"] for _, record in records)
+    columns = [(entry, record) for law in laws for entry, record in records if record["law"] == law]
+    names = dict.fromkeys(name for _, record in columns for name in record if name not in ("initial_condition", "law"))
+    points = [(f"{entry.short}: {record['law']}", record) for entry, record in columns]
+    return upright(f"{CAPTIONS[LAWS]}, from {condition}", names, points)
+
+
+def _joined(table: str, records: Sequence[_Labelled]) -> Table:
+    """The rows of all runs; those of the same start, law and so on stand together, the run behind what they share."""
+    rows: dict[tuple[tuple[str, Any], ...], list[dict[str, Any]]] = {}
+    for entry, record in records:
+        names = list(record)
+        end = names.index(_LAST_KEYS[table]) + 1
+        keys = {name: record[name] for name in names[:end]}
+        own = {name: record[name] for name in names[end:]}
+        rows.setdefault(tuple(keys.items()), []).append(keys | {"run": entry.short} | own)
+    joined = [row for together in rows.values() for row in together]
+    return of_records(CAPTIONS[table], joined, f"{table}.csv of each run")
 
 
 def figures(runs: Sequence[LabelledRun]) -> tuple[dict[str, list[tuple[str, Picture]]], list[str]]:

@@ -3,26 +3,25 @@
 from __future__ import annotations
 
 import re
-import shlex
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
-import pandas as pd
+import pyarrow as pa
 import yaml
 
+from fracctl.arrays import Array
 from fracctl.config.build import build_checked
 from fracctl.config.compose import to_yaml
-from fracctl.config.repeat import overrides_for
 from fracctl.errors import FracctlError, RunError
 from fracctl.figures import drawing
 from fracctl.report.numbers import count
 from fracctl.report.pictures import inline
 from fracctl.report.stored import StoredRun
-from fracctl.report.tables import Table, of_frame, of_records, upright
+from fracctl.report.tables import MOST_ROWS, Table, of_frame, of_records, upright
 from fracctl.report.words import explain
+from fracctl.store import tables as stored_tables
 from fracctl.store.identity import run_id, sources_digest
 
 _NOT_OF_THE_RUN = ("scheduler", "figures", "stored in")
@@ -31,8 +30,9 @@ _OF_THE_PAPER = re.compile(r" \(Figures? [^)]*\)")
 _AFTER_THE_MEASURES = "objective"
 _ALWAYS = ("status", "stable", "error_estimate", "dominant_pole_real", "dominant_pole_imag")
 """What a table of optima shows beside design variables, measures and the objective."""
-_CAPTIONS = {
-    "laws": "The laws side by side",
+LAWS = "laws"
+CAPTIONS = {
+    LAWS: "The laws side by side",
     "comparison": "Every law at its best, by start, limit and band",
     "survival": "What survives: settling of each law, stage by stage",
     "quantiles": "Quantiles over dispersed runs, with intervals of 95 % confidence",
@@ -49,7 +49,7 @@ class Picture:
 
 
 @dataclass(frozen=True)
-class Command:
+class Again:
     """How a run is repeated."""
 
     text: str
@@ -119,8 +119,8 @@ def shown_point(run: StoredRun, objective: str, row: Mapping[str, Any]) -> dict[
 def _concluded(run: StoredRun) -> Iterator[Table]:
     """The tables of the evaluation, with the columns that the summary holds."""
     for name, records in run.tables.items():
-        caption, whole = _CAPTIONS.get(name, name), f"{name}.csv and {name}.parquet"
-        if name != "laws" or not records:
+        caption, whole = CAPTIONS.get(name, name), f"{name}.csv and {name}.parquet"
+        if name != LAWS or not records:
             yield of_records(caption, records, whole)
             continue
         for condition in dict.fromkeys(record["initial_condition"] for record in records):
@@ -139,20 +139,28 @@ def _slices(run: StoredRun) -> Iterator[Table]:
 
 
 def _evaluated(run: StoredRun) -> Iterator[Table]:
-    """The evaluated points, the best ones first where there is an objective."""
-    rows = run.directory.evaluations()
-    words = ", ".join(f"{number} {word}" for word, number in Counter(rows["status"]).most_common())
-    column = f"objective_{run.configuration['objective']}"
-    ranked = column in rows
-    if ranked:
-        rows = _ranked(rows, column)
-    best_by = run.configuration["objective"] if ranked else ""
-    yield of_frame(f"Evaluated points: {count(len(rows), 'row')}, {words}", rows, "evaluations.parquet", best_by)
+    """The evaluated points, the best ones first where there is an objective; only those that are shown are held."""
+    best_by = str(run.configuration["objective"])
+    column = f"objective_{best_by}"
+    words, shown = Counter[str](), None
+    for piece in stored_tables.stream(run.directory.evaluations_path):
+        words.update(piece.column("status").to_pylist())
+        rows = piece if shown is None else pa.concat_tables([shown, piece])
+        shown = rows.take(_best(rows, column)) if column in rows.column_names else rows.slice(0, MOST_ROWS)
+    if shown is None:
+        return
+    if column not in shown.column_names:
+        best_by = ""
+    total = words.total()
+    caption = f"Evaluated points: {count(total, 'row')}, {', '.join(f'{n} {word}' for word, n in words.most_common())}"
+    yield of_frame(caption, stored_tables.to_pandas(shown), "evaluations.parquet", best_by, total)
 
 
-def _ranked(rows: pd.DataFrame, column: str) -> pd.DataFrame:
-    good = rows["status"].eq("ok") & ~rows["stable"].eq(False).fillna(False)
-    return rows.assign(_bad=~good).sort_values(["_bad", column], kind="stable").drop(columns="_bad")
+def _best(rows: pa.Table, column: str) -> Array:
+    """Places of the best rows, first those that may be optima."""
+    frame = stored_tables.to_pandas(rows.select(["status", "stable", column]))
+    frame["bad"] = ~(frame["status"].eq("ok") & ~frame["stable"].eq(False).fillna(False))
+    return frame.sort_values(["bad", column], kind="stable").index[:MOST_ROWS].to_numpy()
 
 
 def pictures(run: StoredRun, prefix: str) -> tuple[list[Picture], list[str]]:
@@ -182,23 +190,30 @@ def configuration_text(run: StoredRun) -> str:
     return yaml.safe_dump(run.configuration, sort_keys=False, allow_unicode=True)
 
 
-def command(run: StoredRun, config_dir: Path | None) -> Command:
-    """Return the command that repeats a run, with its overrides found from the configuration."""
+def command(run: StoredRun) -> Again:
+    """Return the command that started a run, and what it gives now."""
     if run.config is None:
-        return Command("", "The configuration is of another version of fracctl, which does not read it any more.")
-    words = overrides_for(run.config, config_dir)
-    if words is None:
-        return Command("", "No overrides lead to this configuration; it stands below in full.")
-    place = [] if config_dir is None else ["--config-dir", str(config_dir)]
-    return Command(shlex.join(["fracctl", "run", *place, *words]), _identity(run))
+        return Again("", "The configuration is of another version of fracctl, which does not read it any more.")
+    if run.command is None:
+        return Again("", "The run was stored without its command; its configuration stands below in full.")
+    lost = run.command.lost
+    return Again(run.command.line, f"It gives another run now: {lost}." if lost else _given(run))
 
 
-def _identity(run: StoredRun) -> str:
+def _given(run: StoredRun) -> str:
     """Whether the command gives the same run id here, or why it does not."""
     assert run.config is not None
-    if run_id(run.config.model_dump(mode="json")) == run.run_id:
+    assert run.command is not None
+    try:
+        found = run_id(run.command.compose().model_dump(mode="json"))
+    except FracctlError as problem:
+        return f"It gives no run any more: {problem}."
+    named = f" {run.command.study} is the study." if run.command.study else ""
+    if found == run.run_id:
         stored = "--fresh computes it again" if run.status == "finished" else "it goes on from there"
-        return f"It gives the run id {run.run_id}; where that run is stored, {stored}."
+        return f"It gives the run id {run.run_id}; where that run is stored, {stored}.{named}"
+    if found != run_id(run.config.model_dump(mode="json")):
+        return "It gives another configuration now, for files that it names have changed since."
     other = run.provenance.get("sources") != sources_digest()
     why = "of fracctl" if other else "of NumPy or SciPy"
     return (

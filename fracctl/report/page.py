@@ -19,13 +19,8 @@ from fracctl.store.files import make_directory, write_bytes
 _TEMPLATES = Path(__file__).parent / "templates"
 
 
-def run_page(run: StoredRun, config_dir: Path | None = None) -> str:
-    """Return the report on one run.
-
-    Args:
-        run: finished or not.
-        config_dir: a directory of YAML files that the command may name options of.
-    """
+def run_page(run: StoredRun) -> str:
+    """Return the report on one run, finished or not."""
     pictures, undrawn = contents.pictures(run, "f")
     tables, unread = contents.tables(run)
     published_tables, unjudged = published.of_run(run)
@@ -43,11 +38,11 @@ def run_page(run: StoredRun, config_dir: Path | None = None) -> str:
         published=published_tables,
         configuration=contents.configuration_text(run),
         provenance=contents.provenance_rows(run),
-        command=contents.command(run, config_dir),
+        command=contents.command(run),
     )
 
 
-def comparison_page(runs: Sequence[StoredRun], config_dir: Path | None = None) -> str:
+def comparison_page(runs: Sequence[StoredRun]) -> str:
     """Return several runs side by side."""
     labelled = comparison.labelled(runs)
     figures, undrawn = comparison.figures(labelled)
@@ -63,7 +58,7 @@ def comparison_page(runs: Sequence[StoredRun], config_dir: Path | None = None) -
         differences=comparison.differences(labelled),
         results=comparison.results(labelled),
         figures=figures,
-        commands=[(entry.label, contents.command(entry.run, config_dir)) for entry in labelled],
+        commands=[(entry.label, contents.command(entry.run)) for entry in labelled],
         provenance=[(entry.label, contents.provenance_rows(entry.run)) for entry in labelled],
     )
 

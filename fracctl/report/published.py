@@ -10,7 +10,7 @@ from fracctl.report.contents import Picture, pictures
 from fracctl.report.stored import StoredRun
 from fracctl.report.tables import Cell, Column, Table, cell
 from fracctl.reproduction.published import UNITS, WORDS
-from fracctl.reproduction.recipes import Optima, Recipe
+from fracctl.reproduction.recipes import Recipe, RunOptima
 from fracctl.reproduction.section import EXACT, SAMPLED, Reproduction, Row
 from fracctl.reproduction.suites import Section, Suite, read_suite, suite_names
 from fracctl.reproduction.table import cells, conclusion
@@ -45,7 +45,7 @@ def _of_section(run: StoredRun, suite: Suite, name: str) -> Iterator[Table]:
     if run.name not in section.experiments:
         return
     own = [(row, recipe) for row, recipe in suite.rows(name) if _experiments(section, recipe) == {run.name}]
-    optima = Optima(section.points, {run.name: run.directory.optima()}, section.experiment)
+    optima = RunOptima(section.points, {run.name: run.directory.optima()}, section.experiment)
     rows = []
     for row, recipe in own:
         number = optima.number(recipe)

@@ -11,6 +11,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from fracctl.config.command import Command
 from fracctl.config.schemas import RunConfig
 from fracctl.errors import FracctlError, RunError
 from fracctl.figures.results import Results
@@ -101,6 +102,14 @@ class StoredRun:
         try:
             return RunConfig.model_validate(self.configuration)
         except (ValidationError, FracctlError):
+            return None
+
+    @cached_property
+    def command(self) -> Command | None:
+        """What started the run; None where it was not recorded."""
+        try:
+            return Command.model_validate(self.content.get("command"))
+        except ValidationError:
             return None
 
     @property

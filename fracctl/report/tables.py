@@ -86,7 +86,7 @@ def cell(value: Any, column: str = "") -> Cell:
     return Cell(number(int(value) if isinstance(value, numbers.Integral) else float(value), _DIGITS), float(value))
 
 
-def of_frame(caption: str, frame: pd.DataFrame, whole: str, best_by: str = "") -> Table:
+def of_frame(caption: str, frame: pd.DataFrame, whole: str, best_by: str = "", of: int | None = None) -> Table:
     """Return a stored table, without columns that are empty, cut where it is long.
 
     Args:
@@ -94,6 +94,7 @@ def of_frame(caption: str, frame: pd.DataFrame, whole: str, best_by: str = "") -
         frame: rows in the order in which they are shown.
         whole: file that holds all of it.
         best_by: objective by which they are ordered; empty where they are in no order.
+        of: number of rows of the stored table, where `frame` holds the first of them only.
     """
     filled = frame.dropna(axis="columns", how="all")
     names = [str(name) for name in filled.columns]
@@ -101,13 +102,14 @@ def of_frame(caption: str, frame: pd.DataFrame, whole: str, best_by: str = "") -
         [cell(value, name) for name, value in zip(names, row, strict=True)]
         for row in filled.head(MOST_ROWS).itertuples(index=False)
     ]
-    return _table(caption, names, rows, _cut(rows, len(frame), whole, best_by))
+    return _table(caption, names, rows, _cut(rows, of or len(frame), whole, best_by))
 
 
 def of_records(caption: str, records: Sequence[Mapping[str, Any]], whole: str) -> Table:
     """Return rows given one by one as a table; of JSON, where times that do not come are none."""
-    names = [name for name in records[0] if any(record.get(name) is not None for record in records)]
-    rows = [[_json_cell(record.get(name), name) for name in names] for record in records[:MOST_ROWS]]
+    known = dict.fromkeys(name for record in records for name in record)
+    names = [name for name in known if any(record.get(name) is not None for record in records)]
+    rows = [[_json_cell(record, name) for name in names] for record in records[:MOST_ROWS]]
     return _table(caption, names, rows, _cut(rows, len(records), whole))
 
 
@@ -141,14 +143,16 @@ def upright(
     columns += [Column(title, is_name=False, right=True) for title, _ in points]
     rows = []
     for name in names:
-        cells = [_json_cell(point.get(name), name) for _, point in points]
+        cells = [_json_cell(point, name) for _, point in points]
         if any(point.get(name) is not None for _, point in points):
             what, _, given = name.partition(", ")
             rows.append([Cell(what), Cell(given or unit_of(name)), *cells])
     return Table(caption, columns, rows, remark)
 
 
-def _json_cell(value: Any, column: str) -> Cell:
-    if value is None and (column.startswith("settling") or column.endswith("_orbits")):
+def _json_cell(record: Mapping[str, Any], column: str) -> Cell:
+    """A value of JSON, where times that do not come are none; what is not measured is no time."""
+    value = record.get(column)
+    if value is None and column in record and (column.startswith("settling") or column.endswith("_orbits")):
         return Cell("never", math.inf)
     return cell(value, column)

@@ -52,7 +52,7 @@ class Recipe(Strict):
         return [*named, *(point for point in (self.increase_over, self.reduction_from) if point is not None)]
 
 
-class Optima:
+class RunOptima:
     """The optima of a section's runs.
 
     Args:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from decimal import Decimal
 from pathlib import Path
 
+from fracctl.config.command import Command
 from fracctl.config.compose import compose
 from fracctl.config.schemas import RunConfig
 from fracctl.errors import RunError
@@ -15,7 +16,7 @@ from fracctl.execution.executors import Executors
 from fracctl.execution.progress import Progress
 from fracctl.execution.run import RunResult, execute
 from fracctl.reproduction.published import REPRODUCED, UNITS, WORDS, PublishedRow
-from fracctl.reproduction.recipes import Optima, Recipe
+from fracctl.reproduction.recipes import Recipe, RunOptima
 from fracctl.reproduction.suites import Section, Suite
 from fracctl.reproduction.verdicts import judge
 
@@ -104,27 +105,30 @@ def reproduce(
     for sampling, words in settings.items():
         for name in wanted.experiments:
             display = progress(f"{name}, {sampling}") if progress else None
-            config = compose([f"experiment={name}", *words, *overrides])
+            chosen = [f"experiment={name}", *words, *overrides]
+            config = compose(chosen)
             drawn = config.model_copy(update={"figures": {}}) if words else config
-            runs[sampling][name] = _run(name, drawn, display, executors)
+            runs[sampling][name] = _run(name, drawn, Command.of(chosen), display, executors)
     sampled, exact = (_optima(wanted, runs[sampling]) for sampling in SAMPLINGS)
     rows = tuple(_row(published, recipe, sampled, exact) for published, recipe in suite.rows(section))
     output = runs[EXACT][wanted.experiment].run_directory.parents[1]
     return Reproduction(suite.name, section, wanted.title, rows, runs, output / "reproduce" / suite.name / section)
 
 
-def _run(experiment: str, config: RunConfig, progress: Progress | None, executors: Executors | None) -> RunResult:
-    result = execute(config, progress=progress, executors=executors)
+def _run(
+    experiment: str, config: RunConfig, command: Command, progress: Progress | None, executors: Executors | None
+) -> RunResult:
+    result = execute(config, command, progress=progress, executors=executors)
     if error := result.summary.get("error"):
         raise RunError(f"{experiment}: {error}")
     return result
 
 
-def _optima(section: Section, runs: Mapping[str, RunResult]) -> Optima:
-    return Optima(section.points, {name: run.optima for name, run in runs.items()}, section.experiment)
+def _optima(section: Section, runs: Mapping[str, RunResult]) -> RunOptima:
+    return RunOptima(section.points, {name: run.optima for name, run in runs.items()}, section.experiment)
 
 
-def _row(published: PublishedRow, recipe: Recipe, sampled: Optima, exact: Optima) -> Row:
+def _row(published: PublishedRow, recipe: Recipe, sampled: RunOptima, exact: RunOptima) -> Row:
     numbers = (optima.number(recipe) for optima in (sampled, exact))
     computed, truth = (None if number is None else number / UNITS[published.unit] for number in numbers)
     verdict = judge(published, computed)

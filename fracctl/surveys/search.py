@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Literal
 
@@ -42,7 +41,6 @@ class PopulationSearch:
         population: points of a generation, at least 8.
         vary: design variables, or kinds of them as in `bounds`; all others keep the controller's values. None for all.
         objectives: names of the run's objectives; None for the primary one, with NSGA-II for all.
-        constraints: upper limit by measured column, e.g. ``peak_acceleration``.
         baseline: values of varied variables that the searches compared with hold fixed.
         from_controller: whether the controller's values are a point of every first generation, for laws of which few
             gains settle at all.
@@ -66,7 +64,6 @@ class PopulationSearch:
         population: int = 96,
         vary: Sequence[str] | None = ("gains", "orders"),
         objectives: Sequence[str] | None = None,
-        constraints: dict[str, float] | None = None,
         baseline: dict[str, float] | None = None,
         from_controller: bool = False,
     ) -> None:
@@ -77,7 +74,6 @@ class PopulationSearch:
         _check_size("starts", starts, 1)
         _check_size("population", population, SMALLEST_POPULATION)
         _check_size("evaluations", evaluations, population)
-        limits = _limits(constraints or {}, evaluation)
         aims = _aims(algorithm, objectives, evaluation)
         groups = [range(first, min(first + ABREAST, starts)) for first in range(0, starts, ABREAST)]
         held = dict(evaluation.parameters)
@@ -89,7 +85,7 @@ class PopulationSearch:
         ):
             seeds = tuple(_entropy(seed, start, condition, aim) for start in group)
             known = _known(varied, held) if from_controller else None
-            search = SeededSearch(algorithm, condition, aim, varied, seeds, population, evaluations, limits, known)
+            search = SeededSearch(algorithm, condition, aim, varied, seeds, population, evaluations, known)
             self._blocks.append(Block(len(self._blocks), self.n_points, _starts(search, fixed), search))
             self.n_points += len(seeds)
         self._untold = {block.number for block in self._blocks}
@@ -172,15 +168,6 @@ def _without(
 def _check_size(name: str, value: int, least: int) -> None:
     if value < least:
         raise ArgumentError(name, value, f"must be at least {least}")
-
-
-def _limits(constraints: Mapping[str, float], evaluation: Evaluation) -> dict[str, float]:
-    measured = evaluation.measured_columns
-    for column, limit in constraints.items():
-        _check_name(f"constraints.{column}", column, measured)
-        if not (math.isfinite(limit) and limit > 0.0):
-            raise ArgumentError(f"constraints.{column}", limit, "must be a positive upper limit")
-    return {column: float(limit) for column, limit in constraints.items()}
 
 
 def _aims(algorithm: str, objectives: Sequence[str] | None, evaluation: Evaluation) -> list[tuple[str, ...]]:

@@ -2,6 +2,8 @@
 
 Source: J. Blank, K. Deb, pymoo: multi-objective optimization in Python, IEEE Access 8 (2020) 89497. pymoo is imported
 where a search begins, never before.
+
+`fracctl.comparison.populations` has its own differential evolution and CMA-ES, for hundreds of searches in step.
 """
 
 from __future__ import annotations

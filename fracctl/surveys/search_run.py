@@ -11,7 +11,7 @@ from fracctl.arrays import Array, Booleans, Floats, joined
 from fracctl.evaluation import BEYOND_LIMITS, Evaluation
 from fracctl.measures import Measure
 from fracctl.measures.final_distance import FinalDistance
-from fracctl.measures.limits import excess as beyond_constraints
+from fracctl.measures.limits import excess as beyond
 from fracctl.surveys.base import EVALUATIONS_SPENT, POINT, SEARCHED_FOR, Rows
 from fracctl.surveys.optima import candidates
 from fracctl.surveys.search_algorithms import Optimiser, non_dominated
@@ -38,7 +38,7 @@ class SeededSearch:
     point found is at least as good as in every objective, and these rows count for all objectives.
 
     Points without a finite objective are worse than all others. In order, so that the algorithm sees which way is
-    better: those beyond the constraints, by Σ (value / limit - 1)⁺; those that do not settle, by the distance from the
+    better: those beyond the run's constraints, by how far; those that do not settle, by the distance from the
     equilibrium at the horizon; those that are unstable or could not be solved.
 
     All searches of a call advance together: a solver is fastest with many points at a time.
@@ -58,8 +58,6 @@ class SeededSearch:
     """Points of a generation."""
     evaluations: int
     """Evaluations of each search, exactly."""
-    limits: Mapping[str, float]
-    """Upper limits of measured columns."""
     known: tuple[float, ...] | None = None
     """Values of the variables at a point that every search begins with besides its random ones."""
 
@@ -107,19 +105,14 @@ class SeededSearch:
         return {name: np.repeat(values, size) for name, values in starts.items()} | varied
 
     def _values(self, rows: Rows, evaluation: Evaluation) -> tuple[Floats, Booleans]:
-        """Return what is minimised, (n, k), and which rows may be optima, (n,); marks those beyond the limits."""
+        """Return what is minimised, (n, k), and which rows may be optima, (n,)."""
         values = np.stack([rows[f"objective_{name}"] for name in self.objectives], axis=1)
         objectives = evaluation.objectives
         sound = np.logical_and.reduce([candidates(rows, name, objectives[name]) for name in self.objectives])
         broken = rows["status"] == BEYOND_LIMITS
-        excess = np.where(broken, beyond_constraints(rows, evaluation.constraints), 0.0)
-        for column, limit in self.limits.items():
-            excess[sound] += np.maximum(rows[column][sound] / limit - 1.0, 0.0)
-        beyond = excess > 0.0
-        rows["status"][beyond] = BEYOND_LIMITS
+        excess = np.where(broken, beyond(rows, evaluation.constraints), 0.0)
         distance = np.where(~sound & (rows["status"] == "unsettled"), rows[FinalDistance.name], np.inf)
-        admissible = sound & ~beyond
-        return np.where(admissible[:, None], values, penalties(excess, distance)[:, None]), admissible
+        return np.where(sound[:, None], values, penalties(excess, distance)[:, None]), sound
 
     def _path(self, records: Sequence[_Record]) -> dict[str, Array]:
         parts = [record.first for record in records] + [record.found for record in records]

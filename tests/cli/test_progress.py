@@ -46,16 +46,6 @@ def test_a_terminal_sees_label_and_rows(monkeypatch: pytest.MonkeyPatch, total: 
     assert "300" in terminal.getvalue()
 
 
-def test_no_colour_where_none_is_wanted(monkeypatch: pytest.MonkeyPatch) -> None:
-    terminal = Terminal()
-    monkeypatch.setenv("TERM", "xterm-256color")
-    monkeypatch.setenv("NO_COLOR", "1")
-    monkeypatch.setattr(sys, "stderr", terminal)
-    drive(display("label", quiet=False), 300)
-    assert "\x1b[38" not in terminal.getvalue()
-    assert "\x1b[3" not in terminal.getvalue()
-
-
 def test_finishing_without_having_started() -> None:
     Bar("label").finish()
 

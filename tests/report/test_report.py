@@ -10,15 +10,21 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 from fracctl.cli.main import main
+from fracctl.config.command import Command
 from fracctl.config.compose import compose
 from fracctl.execution.run import RunResult, execute
+from fracctl.report import contents
 from fracctl.report.page import comparison_page, run_page
 from fracctl.report.stored import StoredRun
 from fracctl.report.tables import MOST_ROWS
-from fracctl.store import RunDirectory
+from fracctl.store import RunDirectory, tables
 from fracctl.store.identity import run_id
 from tests.comparison.test_comparison import FEW
 from tests.configs.test_files import TINY, TINY_FLIGHT, TINY_SEARCH, TINY_SETTINGS
@@ -74,6 +80,10 @@ SLOW_KINDS = {
 }
 
 
+def computed(words: list[str]) -> RunResult:
+    return execute(compose(words), Command.of(words))
+
+
 def page_of(directory: Path) -> Page:
     return Page(run_page(StoredRun.read(directory)))
 
@@ -100,7 +110,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def grid(tmp_path_factory: pytest.TempPathFactory) -> RunResult:
     folder = tmp_path_factory.mktemp("grid")
-    return execute(compose([*KINDS["grid"][0], "figures=gain_contours", f"output_dir={folder}"]))
+    return computed([*KINDS["grid"][0], "figures=gain_contours", f"output_dir={folder}"])
 
 
 @pytest.fixture
@@ -119,8 +129,8 @@ def change(directory: Path, **content: Any) -> None:
 @pytest.mark.parametrize("kind", [*KINDS, *(pytest.param(kind, marks=pytest.mark.slow) for kind in SLOW_KINDS)])
 def test_a_report_of_each_kind_of_run(kind: str, folder: Path) -> None:
     words, sentence = (KINDS | SLOW_KINDS)[kind]
-    config = compose([*words, f"output_dir={folder}"])
-    result = execute(config)
+    config = compose(words)
+    result = computed([*words, f"output_dir={folder}"])
     page = page_of(result.run_directory)
     check_form(page)
     assert re.search(sentence, page.result), page.result
@@ -155,6 +165,39 @@ def test_a_long_table_is_cut_to_the_best_and_says_where_all_is(grid: RunResult) 
     assert [float(row[head.index("settling_time")]) for row in shown] == pytest.approx(best.tolist(), rel=1e-5)
     remark = f"These are the best {MOST_ROWS} of {len(rows)} rows by settling_time; all are in evaluations.parquet."
     assert remark in page.texts["remark"]
+
+
+def test_of_a_long_table_only_what_is_shown_is_held(stored: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Row groups of ten, points that failed or are unstable first among them; the best come from all of them."""
+    path = stored / "evaluations.parquet"
+    table = pq.read_table(path)
+    n = table.num_rows
+    columns = {name: table.column(name).to_pylist() for name in ("status", "stable")}
+    columns["status"][::2] = ["failed"] * len(range(0, n, 2))
+    columns["stable"][3::11] = [False] * len(range(3, n, 11))
+    for name, values in columns.items():
+        place = table.column_names.index(name)
+        table = table.set_column(place, table.schema.field(name), pa.array(values, table.schema.field(name).type))
+    pq.write_table(table, path, row_group_size=10, write_page_checksum=True)
+    held = []
+    whole = tables.to_pandas
+    monkeypatch.setattr(tables, "to_pandas", lambda rows: (held.append(rows.num_rows), whole(rows))[1])
+    (shown,) = contents._evaluated(StoredRun.read(stored))
+    assert max(held) <= MOST_ROWS + 10 < n
+    rows = whole(table)
+    good = rows["status"].eq("ok") & rows["stable"].ne(False).fillna(True)
+    assert 0 < good.sum() < MOST_ROWS
+    first = rows[good].sort_values("settling_time", kind="stable")
+    others = rows[~good].sort_values("settling_time", kind="stable")
+    expected = pd.concat([first, others]).head(MOST_ROWS)
+    names = [column.name for column in shown.columns]
+    for name in ("k_d_w", "k_p_w", "alpha_w", "settling_time"):
+        keys = [row[names.index(name)].key for row in shown.rows]
+        np.testing.assert_array_equal(np.array(keys, float), expected[name].to_numpy(float))
+    counted = rows["status"].value_counts()
+    assert shown.caption.startswith(f"Evaluated points: {n} rows, ")
+    assert all(f"{number} {word}" in shown.caption for word, number in counted.items())
+    assert f"the best {MOST_ROWS} of {n} rows by settling_time" in shown.remark
 
 
 def test_columns_have_their_units(folder: Path) -> None:
@@ -255,6 +298,47 @@ def test_a_configuration_that_does_not_fit_any_more_is_shown_all_the_same(stored
     assert "orbits" in page.result
 
 
+def test_a_run_stored_without_its_command_says_so(stored: Path) -> None:
+    change(stored, command=None)
+    page = page_of(stored)
+    assert page.commands == []
+    assert "stored without its command" in " ".join(page.sections["again"])
+
+
+def test_words_that_lead_elsewhere_by_now_say_so(stored: Path) -> None:
+    command = StoredRun.read(stored).content["command"]
+    change(stored, command=command | {"words": [*command["words"], "seed=7"]})
+    assert "It gives another configuration now" in " ".join(page_of(stored).sections["again"])
+    change(stored, command=command | {"words": [*command["words"], "sede=7"]})
+    assert "It gives no run any more: unknown key 'sede'" in " ".join(page_of(stored).sections["again"])
+
+
+def test_the_command_of_a_study_names_it_and_tells_of_its_changes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Composing happens once: the command is what was typed, and not searched for."""
+    monkeypatch.chdir(tmp_path)
+    file = tmp_path / "my_study.yaml"
+    file.write_text("name: mine\ncontroller:\n  alpha_w: 0.93\n", encoding="utf-8")
+    words = ["my_study", "controller.k_p_w=0.7", "scheduler=serial", "figures=null"]
+    assert main(["run", *words]) == 0
+    (directory,) = (tmp_path / "outputs" / "mine").iterdir()
+    monkeypatch.chdir("/")
+    count = Counter[str]()
+    composed = Command.compose
+    monkeypatch.setattr(Command, "compose", lambda own: (count.update(["composed"]), composed(own))[1])
+    page = page_of(directory)
+    assert count == {"composed": 1}
+    assert page.commands == [["fracctl", "run", *words[:2], "figures=null"]]
+    said = " ".join(page.sections["again"])
+    assert f"It gives the run id {directory.name}" in said
+    assert f"{file} is the study" in said
+    file.write_text("name: mine\ncontroller:\n  alpha_w: 0.94\n", encoding="utf-8")
+    assert f"{file} has changed since" in " ".join(page_of(directory).sections["again"])
+    file.unlink()
+    assert f"{file} is not there any more" in " ".join(page_of(directory).sections["again"])
+
+
 def test_text_of_a_run_is_text_on_the_page(stored: Path, grid: RunResult) -> None:
     note = "<script>alert(1)</script> & 'quotes'"
     change(stored, summary=grid.summary | {"notes": [note]})
@@ -265,17 +349,8 @@ def test_text_of_a_run_is_text_on_the_page(stored: Path, grid: RunResult) -> Non
 
 
 def test_runs_side_by_side(grid: RunResult, folder: Path) -> None:
-    slower = execute(
-        compose(
-            [
-                "experiment=ic1_outofplane",
-                *GRID,
-                "survey.axes.k_d_w=[1.5,1.6]",
-                "figures=gain_contours",
-                f"output_dir={folder}",
-            ]
-        )
-    )
+    other = ["survey.axes.k_d_w=[1.5,1.6]", "figures=gain_contours", f"output_dir={folder}"]
+    slower = computed(["experiment=ic1_outofplane", *GRID, *other])
     runs = [StoredRun.read(result.run_directory) for result in (grid, slower)]
     page = Page(comparison_page(runs))
     check_form(page)
@@ -305,6 +380,71 @@ def test_runs_of_different_experiments_are_compared_in_what_they_share(grid: Run
     assert "No two of these runs have a result for the same objective" in " ".join(apart.sections["shared"])
 
 
+def law(condition: str, name: str, orbits: float | None, **more: Any) -> dict[str, Any]:
+    return {"initial_condition": condition, "law": name, "settling_orbits": orbits} | more
+
+
+def spread_of(condition: str, name: str, measure: str, median: float) -> dict[str, Any]:
+    return {"initial_condition": condition, "law": name, "measure": measure, "samples": 40, "median": median}
+
+
+def survived(condition: str, name: str, stage: str, orbits: float | None) -> dict[str, Any]:
+    return {"initial_condition": condition, "law": name, "stage": stage, "band_m": 100.0, "median_orbits": orbits}
+
+
+def compared(condition: str, limit: float, name: str, objective: float) -> dict[str, Any]:
+    keys = {"initial_condition": condition, "limit": "gain", "limit_value": limit, "threshold_m": 10.0, "law": name}
+    return keys | {"objective": objective, "verdict": "better"}
+
+
+def test_tables_of_laws_are_joined(stored: Path, grid: RunResult) -> None:
+    """The same law, start, stage or measure of several runs stand together; a run alone with one has it alone."""
+    other = stored.with_name("0123456789ab")
+    shutil.copytree(stored, other)
+    one = {
+        "laws": [law("ic1", "pd", 0.5), law("ic1", "lqr", None), law("ic2", "pd", 0.7)],
+        "quantiles": [spread_of("ic1", "pd", "effort", 1.0), spread_of("ic1", "pd", "overshoot", 2.0)],
+        "survival": [survived("ic1", "pd", "ideal", 0.25), survived("ic1", "pd", "sampled", None)],
+        "comparison": [compared("ic1", 4.0, "pd", 3.0), compared("ic1", 8.0, "pd", 2.0)],
+        "alone": [{"initial_condition": "ic1"}],
+    }
+    two = {
+        "laws": [law("ic1", "pd", 0.25, delta_v_m_s=12.0), law("ic1", "pid", 0.9)],
+        "quantiles": [spread_of("ic1", "pd", "effort", 1.5)],
+        "survival": [survived("ic1", "pd", "ideal", 0.5)],
+        "comparison": [compared("ic1", 8.0, "pd", 2.5)],
+    }
+    for directory, tables_of_run in ((stored, one), (other, two)):
+        change(directory, summary=grid.summary | {"tables": tables_of_run})
+    page = Page(comparison_page([StoredRun.read(stored), StoredRun.read(other)]))
+    check_form(page)
+    captions = [str(table["caption"]) for table in page.tables]
+    assert len([caption for caption in captions if caption.startswith("The laws side by side")]) == 2
+    assert page.table("The laws side by side, from ic1") == [
+        ["quantity", "unit", "A: pd", "B: pd", "A: lqr", "B: pid"],
+        ["settling_orbits", "orbits", "0.5", "0.25", "never", "0.9"],
+        ["delta_v_m_s", "m/s", "–", "12", "–", "–"],
+    ]
+    assert page.table("The laws side by side, from ic2")[0] == ["quantity", "unit", "A: pd"]
+    assert page.table("Quantiles over dispersed runs") == [
+        ["initial_condition", "law", "measure", "run", "samples", "median"],
+        ["ic1", "pd", "effort", "A", "40", "1"],
+        ["ic1", "pd", "effort", "B", "40", "1.5"],
+        ["ic1", "pd", "overshoot", "A", "40", "2"],
+    ]
+    assert [row[2:4] + row[-1:] for row in page.table("What survives")[1:]] == [
+        ["ideal", "A", "0.25"],
+        ["ideal", "B", "0.5"],
+        ["sampled", "A", "never"],
+    ]
+    assert [[row[2], *row[5:7]] for row in page.table("Every law at its best")[1:]] == [
+        ["4", "A", "3"],
+        ["8", "A", "2"],
+        ["8", "B", "2.5"],
+    ]
+    assert not any("alone" in caption for caption in captions)
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
@@ -317,7 +457,7 @@ def test_runs_of_different_experiments_are_compared_in_what_they_share(grid: Run
         (["empty", "empty"], "'empty' is named twice"),
         (["experiment=tether"], "takes directories of runs, not the override"),
         (["outputs/one/0123", "--to", "empty"], "--to empty is a directory; name a file in it, as empty/report.html"),
-        (["--config", "x"], "unknown option '--config'; did you mean '--config-dir'?"),
+        (["--jsn"], "unknown option '--jsn'; did you mean '--json'?"),
     ],
 )
 def test_what_is_no_run_gets_a_sentence(

@@ -12,7 +12,7 @@ import pytest
 from fracctl.config.build import build_checked
 from fracctl.config.compose import compose
 from fracctl.errors import ConfigurationError
-from fracctl.reproduction.recipes import Optima, Point, Recipe
+from fracctl.reproduction.recipes import Point, Recipe, RunOptima
 from fracctl.reproduction.suites import read_suite, suite_names, suites_directory
 from fracctl.surveys.optima import KINDS
 
@@ -165,7 +165,7 @@ def number(**recipe: object) -> float | None:
         "none": Point(initial_condition="ic2", objective="st", kind="overall"),
     }
     tables = {"own": TABLE, "other": TABLE.assign(st=10.0)}
-    return Optima(points, tables, "own").number(Recipe.model_validate({"column": "st", **recipe}))
+    return RunOptima(points, tables, "own").number(Recipe.model_validate({"column": "st", **recipe}))
 
 
 def test_recipes() -> None:

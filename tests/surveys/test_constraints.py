@@ -75,6 +75,8 @@ def test_a_limit_is_a_comparison_with_a_number(text: str) -> None:
     ("words", "sentence"),
     [
         (['constraints.phase_margin_de=">= 4"'], "did you mean 'constraints.phase_margin_deg'?"),
+        (["survey=search", "survey.constraints.overshoot=4"], "set 'constraints.COLUMN=\"<= NUMBER\"'"),
+        (["survey=out_of_plane", "+survey.constraints.overshoot=4"], "limits belong to the run, not to its survey"),
         (['constraints.phase_margin_deg="> 4"'], "must be '>= number' or '<= number', in quotes"),
         (["plant=hcw_in_plane", "controller=pd_in_plane"], "is made for 1 control, but hcw_in_plane has 2"),
         (["evaluation=comparison", "survey=comparison"], "needs evaluation=performance"),
