@@ -19,6 +19,7 @@ from fracctl.plants.state import StatePlant
 from fracctl.sampled import Actuator, Memory, Navigation, SampledLaw, Window, memory_for
 from fracctl.sampled.simulation import AntiWindup
 from fracctl.sampled.tolerance import Kind
+from fracctl.sampled.window import MOST_SAMPLES
 from fracctl.units import Spacecraft
 
 
@@ -49,6 +50,8 @@ class Sampling:
         if self.memory_samples is not None and self.memory != "window":
             allowed = f"goes with memory = window, but memory = {self.memory}"
             raise ArgumentError("memory_samples", self.memory_samples, allowed)
+        if self.memory_samples is not None and self.memory_samples > MOST_SAMPLES:
+            raise ArgumentError("memory_samples", self.memory_samples, f"must be at most {MOST_SAMPLES}")
 
     def law(self, loop: ClosedLoop) -> SampledLaw:
         """Return the law of a loop as it runs on board.
@@ -66,7 +69,12 @@ class Sampling:
     def _memory(self, loop: ClosedLoop, period: float) -> Memory:
         if self.memory_samples is not None:
             return Window(self.memory_samples)
-        return memory_for(loop, self.memory, period, self.memory_tolerance, self.feed)
+        try:
+            return memory_for(loop, self.memory, period, self.memory_tolerance, self.feed)
+        except ArgumentError as error:
+            if error.name != "tolerance":
+                raise
+            raise ArgumentError("memory_tolerance", error.value, error.allowed, error.instead) from error
 
 
 @dataclass(frozen=True)
