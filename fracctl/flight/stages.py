@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
@@ -16,7 +17,7 @@ from fracctl.flight.names import CERTAIN, Stage
 from fracctl.loop import ClosedLoop
 from fracctl.plants.linear import LinearPlant
 from fracctl.plants.state import StatePlant
-from fracctl.sampled import Actuator, Memory, Navigation, SampledLaw, Window, memory_for
+from fracctl.sampled import Actuator, Memory, Navigation, SampledLaw, Window, dimensionless_time, memory_for
 from fracctl.sampled.simulation import AntiWindup
 from fracctl.sampled.tolerance import Kind
 from fracctl.sampled.window import MOST_SAMPLES
@@ -47,6 +48,8 @@ class Sampling:
     """What a limit does to the memory."""
 
     def __post_init__(self) -> None:
+        if not (math.isfinite(self.period_s) and self.period_s > 0.0):
+            raise ArgumentError("period_s", self.period_s, "must be positive")
         if self.memory_samples is not None and self.memory != "window":
             allowed = f"goes with memory = window, but memory = {self.memory}"
             raise ArgumentError("memory_samples", self.memory_samples, allowed)
@@ -57,10 +60,10 @@ class Sampling:
         """Return the law of a loop as it runs on board.
 
         Raises:
-            UnsupportedError: the loop is not stable, so that no memory can be chosen for it.
+            UnsupportedError: the loop is not stable, so that no memory can be chosen for it, or the plant has no units.
         """
         plant: Any = loop.plant
-        period = self.period_s / plant.scales.time_s
+        period = dimensionless_time(plant, self.period_s)
         law: Any = loop.controller
         if hasattr(law, "for_plant"):
             law = law.for_plant(plant)
