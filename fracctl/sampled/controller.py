@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from scipy.sparse import block_array, csr_array
 
-from fracctl.arrays import Array, Booleans, Complexes, Floats
+from fracctl.arrays import Array, Complexes, Floats
 from fracctl.compiling import compiled_with
 from fracctl.sampled.operators import Sparse, substituted
 
@@ -32,8 +32,8 @@ class DiscreteController:
     """D, (m, 2m)."""
     e: Floats
     """E, (n, 2m)."""
-    integrating: Booleans
-    """Which states belong to integrals of the position, (n,): those that anti-windup holds."""
+    integral_of: Array
+    """Number of the position whose integral a state belongs to, which anti-windup may hold, (n,); -1 for others."""
     period: float
     """T_s, dimensionless."""
     delay: float

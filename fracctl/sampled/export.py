@@ -124,7 +124,7 @@ def export(plant: StatePlant, law: SampledLaw) -> ExportedController:
         made.c / time**2,
         made.d * columns / time**2,
         made.e * columns,
-        made.integrating,
+        made.integral_of,
         made.period,
         made.delay,
     )

@@ -84,7 +84,7 @@ class SampledLaw:
             parts.add(self.memory.derivative(order, h), j, gain)
         elif -1.0 <= order < 0.0:
             integral = trapezoid(h) if order == -1.0 else self.memory.integral(-order, h)
-            parts.add(integral, j, gain, integrating=True)
+            parts.add(integral, j, gain, integral=True)
         else:
             raise UnsupportedError(f"a sampled law has derivatives of orders up to 1, not {order:g}")
 
@@ -122,9 +122,9 @@ class _Parts:
     def __init__(self, n_controls: int) -> None:
         self.m, self.d = n_controls, np.zeros((n_controls, 2 * n_controls))
         self._blocks: list[tuple[Sparse, Floats, Floats, Floats]] = []
-        self._integrating: list[bool] = []
+        self._integral_of: list[int] = []
 
-    def add(self, operator: SampledOperator, signal: int, gain: Floats, *, integrating: bool = False) -> None:
+    def add(self, operator: SampledOperator, signal: int, gain: Floats, *, integral: bool = False) -> None:
         """Add gain times an operator on one of the measurements."""
         pick = np.eye(2 * self.m)[signal]
         self.append(
@@ -132,23 +132,22 @@ class _Parts:
             np.outer(operator.b, pick),
             np.outer(gain, operator.c),
             np.outer(operator.e, pick),
-            integrating=integrating,
+            integral_of=signal if integral else -1,
         )
         self.d[:, signal] += gain * operator.f
 
-    def append(self, a: Sparse, b: Floats, c: Floats, e: Floats, *, integrating: bool = False) -> None:
+    def append(self, a: Sparse, b: Floats, c: Floats, e: Floats, *, integral_of: int = -1) -> None:
         """Add states."""
         self._blocks.append((a, b, c, e))
-        self._integrating += [integrating] * len(b)
+        self._integral_of += [integral_of] * len(b)
 
     def controller(self, period: float, delay: float) -> DiscreteController:
         """Return all of them as one."""
         m = self.m
         none = np.zeros((0, 2 * m))
         a, b, c, e = zip((csr_array((0, 0)), none, none.T[:m], none), *self._blocks, strict=True)
-        integrating = np.array(self._integrating, dtype=bool)
         whole = (csr_array(block_diag(a)), np.concatenate(b), np.concatenate(c, axis=1), self.d, np.concatenate(e))
-        return DiscreteController(*whole, integrating, period, delay)
+        return DiscreteController(*whole, np.array(self._integral_of, dtype=int), period, delay)
 
 
 def dimensionless_time(plant: StatePlant, seconds: float) -> float:

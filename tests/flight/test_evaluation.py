@@ -217,6 +217,10 @@ REFUSED = [
     (["evaluation.truth={type: hcw}"], "evaluation.truth.type = hcw: must be motion about a leader"),
     (["evaluation.truth={type: relative_motion, eccentricity: 2}"], "evaluation.truth.eccentricity = 2: must lie in"),
     (["evaluation.dispersions.offset_x_m=[normal, 0, 1]"], "must be one of offset_u_m, offset_v_m"),
+    (
+        ["evaluation.thrusters.impulse_bit_n_s=400"],
+        "impulse_bit_n_s = 400: is more than the thrusters give in a period",
+    ),
     (["evaluation.memory_samples=20"], "evaluation.memory_samples = 20: goes with memory = window"),
     (
         ["evaluation.memory=window", "evaluation.memory_samples=50000"],
