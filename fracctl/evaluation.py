@@ -15,8 +15,8 @@ from fracctl.controllers.linear import LinearLaw, ModelBasedLaw
 from fracctl.controllers.parameters import Parameter
 from fracctl.controllers.saturation import Saturation
 from fracctl.errors import ArgumentError, UnsupportedError
-from fracctl.loop import ClosedLoop
-from fracctl.measures.base import LoopMeasure, Measure
+from fracctl.loop import ClosedLoop, Need
+from fracctl.measures.base import FLOQUET, LoopMeasure, Measure
 from fracctl.measures.limits import Limit, excess
 from fracctl.plants.linear import LinearPlant
 from fracctl.solvers.base import Solver
@@ -233,7 +233,11 @@ class Evaluation:
         unsettled = np.logical_or.reduce([~np.isfinite(values[name]) for name in self._judged])
         marginal = np.array([self.has_poles and verdict is None for verdict in trajectory.stable], dtype=bool)
         status[(status == "ok") & (unsettled | marginal)] = "unsettled"
-        rows |= {"status": status, "stable": trajectory.stable, "error_estimate": trajectory.error_estimate}
+        stable = trajectory.stable
+        if FLOQUET in of_loop and Need.PERIODIC_PLANT in self.loop({}).needs and self.saturation is None:
+            stable = (of_loop[FLOQUET] < 1.0).astype(object)
+            status[np.isin(status, ("ok", "unsettled")) & (of_loop[FLOQUET] >= 1.0)] = "unstable"
+        rows |= {"status": status, "stable": stable, "error_estimate": trajectory.error_estimate}
         return rows | {name: trajectory.counters[name] for name in COUNTERS}
 
 

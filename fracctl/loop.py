@@ -25,6 +25,7 @@ class Need(StrEnum):
 
     FRACTIONAL_TERMS = "fractional terms"
     NONLINEAR_PLANT = "a nonlinear plant"
+    PERIODIC_PLANT = "a linear plant with periodic coefficients"
     DELAYS = "delayed states"
     SATURATION = "a saturated control"
     NONLINEAR_LAW = "a nonlinear law with memory"
@@ -63,7 +64,7 @@ class ClosedLoop:
         """What a solver of this loop must be able to do; nothing for the free motion of a linear plant."""
         needs = set()
         if not isinstance(self.plant, LinearPlant):
-            needs.add(Need.NONLINEAR_PLANT)
+            needs.add(Need.PERIODIC_PLANT if getattr(self.plant, "linear", False) else Need.NONLINEAR_PLANT)
         if isinstance(self.controller, DelayedLaw):
             needs.add(Need.DELAYS)
         elif isinstance(self.controller, MemoryLaw):
@@ -111,7 +112,9 @@ class ClosedLoop:
         plant = self.plant
         if not isinstance(plant, LinearPlant) or isinstance(self.controller, DelayedLaw | MemoryLaw):
             found = " and ".join(sorted(self.needs))
-            raise UnsupportedError(f"a linear fractional loop is asked for, but this one has {found}")
+            raise UnsupportedError(
+                f"a linear fractional loop with constant coefficients is asked for, but this one has {found}"
+            )
         m, law = plant.n_controls, self.law_terms
         q = law.n_auxiliary
         identity = FractionalTerm(np.eye(m + q), np.array([2.0] * m + [1.0] * q))

@@ -100,14 +100,21 @@ def surroundings(config: RunConfig, given: FlightEvaluation, plant: Any) -> Surr
         where = f"evaluation.thrusters.impulse_bit_n_s = {thrusters.impulse_bit_n_s:g}"
         raise ConfigurationError(f"{where}: needs a mass; set spacecraft.mass_kg")
     navigation = given.navigation
+    actuator = Actuator(
+        saturation(config, scales),
+        1e-3 * thrusters.deadband_mm_s2 / scales.acceleration_m_s2,
+        thrusters.impulse_bit_n_s / (craft.mass_kg or 1.0) / scales.speed_m_s,
+    )
+    try:
+        actuator.check(plant.n_controls, given.period_s / scales.time_s)
+    except ArgumentError as error:
+        where = f"evaluation.thrusters.impulse_bit_n_s = {thrusters.impulse_bit_n_s:g}"
+        cure = "take a smaller bit, more thrust, or a longer period_s"
+        raise ConfigurationError(f"{where}: is more than the thrusters give in a period; {cure}") from error
     return Surroundings(
         plant,
         None if given.truth is None else _truth(given, plant),
-        Actuator(
-            saturation(config, scales),
-            1e-3 * thrusters.deadband_mm_s2 / scales.acceleration_m_s2,
-            thrusters.impulse_bit_n_s / (craft.mass_kg or 1.0) / scales.speed_m_s,
-        ),
+        actuator,
         Navigation(
             navigation.position_noise_m / scales.length_m,
             navigation.velocity_noise_m_s / scales.speed_m_s,

@@ -78,6 +78,7 @@ BUILT_IN: Mapping[str, Mapping[str, str]] = {
         "stability_margins": "fracctl.measures:StabilityMargins",
         "sensitivity": "fracctl.measures:Sensitivity",
         "noise_gain": "fracctl.measures:NoiseGain",
+        "floquet_multiplier": "fracctl.measures.floquet_multiplier:FloquetMultiplier",
         "final_delay": "fracctl.measures.final_delay:FinalDelay",
         "lyapunov_exponent": "fracctl.measures.lyapunov_exponent:LyapunovExponent",
         "largest_multiplier": "fracctl.measures.largest_multiplier:LargestMultiplier",

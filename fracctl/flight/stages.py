@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
@@ -16,9 +17,10 @@ from fracctl.flight.names import CERTAIN, Stage
 from fracctl.loop import ClosedLoop
 from fracctl.plants.linear import LinearPlant
 from fracctl.plants.state import StatePlant
-from fracctl.sampled import Actuator, Memory, Navigation, SampledLaw, Window, memory_for
+from fracctl.sampled import Actuator, Memory, Navigation, SampledLaw, Window, dimensionless_time, memory_for
 from fracctl.sampled.simulation import AntiWindup
 from fracctl.sampled.tolerance import Kind
+from fracctl.sampled.window import MOST_SAMPLES
 from fracctl.units import Spacecraft
 
 
@@ -46,18 +48,22 @@ class Sampling:
     """What a limit does to the memory."""
 
     def __post_init__(self) -> None:
+        if not (math.isfinite(self.period_s) and self.period_s > 0.0):
+            raise ArgumentError("period_s", self.period_s, "must be positive")
         if self.memory_samples is not None and self.memory != "window":
             allowed = f"goes with memory = window, but memory = {self.memory}"
             raise ArgumentError("memory_samples", self.memory_samples, allowed)
+        if self.memory_samples is not None and self.memory_samples > MOST_SAMPLES:
+            raise ArgumentError("memory_samples", self.memory_samples, f"must be at most {MOST_SAMPLES}")
 
     def law(self, loop: ClosedLoop) -> SampledLaw:
         """Return the law of a loop as it runs on board.
 
         Raises:
-            UnsupportedError: the loop is not stable, so that no memory can be chosen for it.
+            UnsupportedError: the loop is not stable, so that no memory can be chosen for it, or the plant has no units.
         """
         plant: Any = loop.plant
-        period = self.period_s / plant.scales.time_s
+        period = dimensionless_time(plant, self.period_s)
         law: Any = loop.controller
         if hasattr(law, "for_plant"):
             law = law.for_plant(plant)
@@ -66,7 +72,12 @@ class Sampling:
     def _memory(self, loop: ClosedLoop, period: float) -> Memory:
         if self.memory_samples is not None:
             return Window(self.memory_samples)
-        return memory_for(loop, self.memory, period, self.memory_tolerance, self.feed)
+        try:
+            return memory_for(loop, self.memory, period, self.memory_tolerance, self.feed)
+        except ArgumentError as error:
+            if error.name != "tolerance":
+                raise
+            raise ArgumentError("memory_tolerance", error.value, error.allowed, error.instead) from error
 
 
 @dataclass(frozen=True)

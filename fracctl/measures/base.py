@@ -62,6 +62,8 @@ class LoopMeasure(Protocol):
         ...
 
 
+FLOQUET = "floquet_multiplier"
+"""Column of a loop measure that decides on stability where coefficients are periodic."""
 TRAJECTORIES = {
     "Trajectory": "linear fractional loops",
     "StepwiseTrajectory": "the method of steps",

@@ -26,6 +26,9 @@ class TschaunerHempel(AboutKeplerOrbit):
         ArgumentError: the orbit is not an ellipse, or a number is not finite.
     """
 
+    linear = True
+    """In states and controls, with coefficients of the orbit's period."""
+
     def rates(self, t: Floats, x: Floats, u: Floats) -> Floats:
         """Return x' of x = [x, y, z, x', y', z'], (b, 6)."""
         r, omega, omega_dot = self.leader_motion(t).T

@@ -18,6 +18,8 @@ class Actuator:
 
         |w_i| < deadband → 0;        saturation by axis or by norm;        |u_i| T_s < bit: the nearer of 0 and bit
 
+    With a limit by norm one engine is turned, and the bit is one of |u|: the direction stays.
+
     What a spacecraft then feels is `efficiency` times that: thrust off its nominal value, a mass that is not the one
     the law takes it for.
 
@@ -28,11 +30,11 @@ class Actuator:
     Args:
         saturation: `fracctl.controllers.Saturation`; None for no limit.
         deadband: () or (m,), accelerations over the plant's scale.
-        impulse_bit: () or (m,), velocities over the plant's scale.
+        impulse_bit: () or (m,), velocities over the plant's scale; with a limit by norm ().
         efficiency: acceleration given over that asked for, () or (b,), of all axes.
 
     Raises:
-        ArgumentError: a number is negative, or an efficiency not positive.
+        ArgumentError: a number is negative, an efficiency not positive, or a limit by norm has bits of axes beside it.
     """
 
     saturation: Saturation | None = None
@@ -50,17 +52,33 @@ class Actuator:
         if share.ndim > 1 or not (share > 0.0).all():
             raise ArgumentError("efficiency", share.tolist(), "must be a number or (b,), and positive")
         object.__setattr__(self, "efficiency", share)
+        if self._turned and np.ndim(self.impulse_bit):
+            raise ArgumentError("impulse_bit", np.asarray(self.impulse_bit).tolist(), "must be a number by norm")
+
+    def check(self, n_controls: int, period: float) -> None:
+        """Raise ArgumentError unless the limit fits a plant with m controls, and gives a bit in a period."""
+        if self.saturation is None:
+            return
+        self.saturation.check(n_controls)
+        if (np.asarray(self.impulse_bit) > period * self.saturation.limit.min()).any():
+            allowed = f"must be at most what the thrusters give in a period, {period * self.saturation.limit.min():g}"
+            raise ArgumentError("impulse_bit", np.asarray(self.impulse_bit).tolist(), allowed)
 
     def __call__(self, demand: Floats, period: float) -> tuple[Floats, Booleans]:
-        """Return the controls (b, m) that come of demands, and who is at a limit, (b,)."""
+        """Return the controls that come of demands, and which are at a limit, (b, m) each."""
         control = np.where(np.abs(demand) < self.deadband, 0.0, demand)
-        limited = np.zeros(len(demand), dtype=bool)
+        limited = np.zeros(demand.shape, dtype=bool)
         if self.saturation is not None:
             cut = self.saturation(control)
-            limited = (cut != control).any(axis=1)
+            limited = cut != control
             control = cut
         least = np.asarray(self.impulse_bit) / period
         if least.any():
-            size = np.abs(control)
-            control = np.where(size < least, np.where(size < 0.5 * least, 0.0, np.copysign(least, control)), control)
+            size = np.linalg.norm(control, axis=1, keepdims=True) if self._turned else np.abs(control)
+            fired = np.where(size < 0.5 * least, 0.0, least / np.where(size > 0.0, size, 1.0))
+            control = control * np.where(size < least, fired, 1.0)
         return control * np.reshape(self.efficiency, (-1, 1)), limited
+
+    @property
+    def _turned(self) -> bool:
+        return self.saturation is not None and self.saturation.by == "norm"

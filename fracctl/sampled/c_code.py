@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from fracctl.arrays import Array
 from fracctl.sampled.controller import DiscreteController, Rows
@@ -100,7 +101,7 @@ def c_source(controller: DiscreteController, period_s: float, components: Sequen
         "OUTPUTS": str(m),
         "LENGTH": str(max(n, 1)),
         "STEP": _rows("step", controller.rows),
-        "INIT": _rows("init", Rows.of(controller.e)),
+        "INIT": _rows("init", Rows.of(csr_array(controller.e))),
     }
     text = _TEMPLATE
     for name, value in filled.items():

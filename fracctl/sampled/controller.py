@@ -6,10 +6,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.sparse import block_array, csr_array
 
-from fracctl.arrays import Array, Booleans, Complexes, Floats
+from fracctl.arrays import Array, Complexes, Floats
 from fracctl.compiling import compiled_with
-from fracctl.sampled.operators import substituted
+from fracctl.sampled.operators import Sparse, substituted
 
 
 @dataclass(frozen=True)
@@ -21,7 +22,7 @@ class DiscreteController:
     x_0 is the memory that begins at y_0. A is lower triangular.
     """
 
-    a: Floats
+    a: Sparse
     """A, (n, n)."""
     b: Floats
     """B, (n, 2m)."""
@@ -31,8 +32,8 @@ class DiscreteController:
     """D, (m, 2m)."""
     e: Floats
     """E, (n, 2m)."""
-    integrating: Booleans
-    """Which states belong to integrals of the position, (n,): those that anti-windup holds."""
+    integral_of: Array
+    """Number of the position whose integral a state belongs to, which anti-windup may hold, (n,); -1 for others."""
     period: float
     """T_s, dimensionless."""
     delay: float
@@ -41,7 +42,7 @@ class DiscreteController:
     @property
     def n_states(self) -> int:
         """Number n of states."""
-        return len(self.a)
+        return len(self.b)
 
     @property
     def n_controls(self) -> int:
@@ -51,7 +52,7 @@ class DiscreteController:
     @cached_property
     def rows(self) -> Rows:
         """[A B; C D] without its zeros."""
-        return Rows.of(np.block([[self.a, self.b], [self.c, self.d]]))
+        return Rows.of(csr_array(block_array([[self.a, csr_array(self.b)], [csr_array(self.c), csr_array(self.d)]])))
 
     @property
     def operations(self) -> int:
@@ -96,11 +97,12 @@ class Rows:
     value: Floats
 
     @classmethod
-    def of(cls, matrix: Floats) -> Rows:
+    def of(cls, matrix: Sparse) -> Rows:
         """Return the rows of a matrix."""
-        row, column = np.nonzero(matrix)
-        first = np.searchsorted(row, np.arange(len(matrix) + 1))
-        return cls(first.astype(np.int64), column.astype(np.int64), np.ascontiguousarray(matrix[row, column]))
+        rows = matrix.copy()
+        rows.eliminate_zeros()
+        rows.sort_indices()
+        return cls(rows.indptr.astype(np.int64), rows.indices.astype(np.int64), rows.data)
 
     @property
     def operations(self) -> int:

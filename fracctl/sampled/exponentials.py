@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from fracctl.errors import ArgumentError
 from fracctl.fractional.sum_of_exponentials import SumOfExponentials, sum_of_exponentials
@@ -52,7 +53,7 @@ class Exponentials:
         first = np.concatenate([[1.0], np.zeros(len(share))])
         c = np.concatenate([[-local], found.weights * decay])
         # the modes take up the last slope with the next sample, so the present ones still lack it
-        return SampledOperator(a, np.concatenate([[1.0], share]), c, local, first)
+        return SampledOperator(csr_array(a), np.concatenate([[1.0], share]), c, local, first)
 
     def integral(self, order: float, period: float) -> SampledOperator:
         """Return I^order of a signal, order in (0, 1), from the first sample."""
@@ -64,4 +65,4 @@ class Exponentials:
         a[1:, 1:] = np.diag(decay)
         b = np.concatenate([[1.0], earlier + decay * present])
         e = np.concatenate([[(float(found.weights @ present) - now) / before], -present])
-        return SampledOperator(a, b, np.concatenate([[before], found.weights]), now, e)
+        return SampledOperator(csr_array(a), b, np.concatenate([[before], found.weights]), now, e)

@@ -43,7 +43,6 @@ class ExportedController:
     def as_json(self) -> dict[str, Any]:
         """Return what `controller.json` holds; A is given by its entries, row, column, value, from 0."""
         c = self.controller
-        rows, columns = np.nonzero(c.a)
         return {
             "format": FORMAT,
             "description": self.description,
@@ -56,7 +55,7 @@ class ExportedController:
             "states": c.n_states,
             "operations": c.operations,
             "law": list(self.gains),
-            "A": {"rows": rows.tolist(), "columns": columns.tolist(), "values": c.a[rows, columns].tolist()},
+            "A": {name: entries.tolist() for name, entries in self._entries.items()},
             **{name: getattr(c, name.lower()).tolist() for name in "BCDE"},
         }
 
@@ -72,9 +71,10 @@ class ExportedController:
         try:
             folder.mkdir(parents=True, exist_ok=True)
             paths[0].write_text(text, encoding="utf-8")
-            matrices = {name: getattr(c, name.lower()) for name in "ABCDE"}
+            matrices = {name: getattr(c, name.lower()) for name in "BCDE"}
             np.savez_compressed(
                 paths[1],
+                **{f"A_{name}": entries for name, entries in self._entries.items()},
                 **matrices,
                 period_s=self.period_s,
                 delay_s=self.period_s * c.delay,
@@ -84,6 +84,12 @@ class ExportedController:
         except OSError as error:
             raise RunError(f"cannot write to '{folder}': {error.strerror}") from error
         return paths
+
+    @property
+    def _entries(self) -> dict[str, Any]:
+        """A by its entries, for a long memory is a matrix of hardly anything but zeros."""
+        found = self.controller.a.tocoo()
+        return {"rows": found.row, "columns": found.col, "values": found.data}
 
     @property
     def _remarks(self) -> list[str]:
@@ -118,7 +124,7 @@ def export(plant: StatePlant, law: SampledLaw) -> ExportedController:
         made.c / time**2,
         made.d * columns / time**2,
         made.e * columns,
-        made.integrating,
+        made.integral_of,
         made.period,
         made.delay,
     )

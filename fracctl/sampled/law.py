@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from scipy.sparse import block_diag, csr_array, diags_array
 
 from fracctl.arrays import Floats
 from fracctl.controllers.linear import LinearLaw, LinearLawTerms
@@ -14,7 +15,7 @@ from fracctl.errors import ArgumentError, UnsupportedError
 from fracctl.fractional.terms import FractionalTerm
 from fracctl.plants.state import StatePlant
 from fracctl.sampled.controller import DiscreteController
-from fracctl.sampled.operators import Memory, SampledOperator, difference, first_order_hold, trapezoid
+from fracctl.sampled.operators import Memory, SampledOperator, Sparse, difference, first_order_hold, trapezoid
 
 
 @dataclass(frozen=True)
@@ -83,7 +84,7 @@ class SampledLaw:
             parts.add(self.memory.derivative(order, h), j, gain)
         elif -1.0 <= order < 0.0:
             integral = trapezoid(h) if order == -1.0 else self.memory.integral(-order, h)
-            parts.add(integral, j, gain, integrating=True)
+            parts.add(integral, j, gain, integral=True)
         else:
             raise UnsupportedError(f"a sampled law has derivatives of orders up to 1, not {order:g}")
 
@@ -111,7 +112,7 @@ class SampledLaw:
         decay, earlier, present = first_order_hold(rates, self.period)
         now = direct + present[:, None] * inputs
         gain = sum((_single(term)[0][:, m:] for term in terms.control), np.zeros((m, q)))
-        parts.append(np.diag(decay), (earlier + decay * present)[:, None] * inputs, gain, -now)
+        parts.append(csr_array(diags_array(decay)), (earlier + decay * present)[:, None] * inputs, gain, -now)
         parts.d += gain @ now
 
 
@@ -120,10 +121,10 @@ class _Parts:
 
     def __init__(self, n_controls: int) -> None:
         self.m, self.d = n_controls, np.zeros((n_controls, 2 * n_controls))
-        self._blocks: list[tuple[Floats, Floats, Floats, Floats]] = []
-        self._integrating: list[bool] = []
+        self._blocks: list[tuple[Sparse, Floats, Floats, Floats]] = []
+        self._integral_of: list[int] = []
 
-    def add(self, operator: SampledOperator, signal: int, gain: Floats, *, integrating: bool = False) -> None:
+    def add(self, operator: SampledOperator, signal: int, gain: Floats, *, integral: bool = False) -> None:
         """Add gain times an operator on one of the measurements."""
         pick = np.eye(2 * self.m)[signal]
         self.append(
@@ -131,25 +132,22 @@ class _Parts:
             np.outer(operator.b, pick),
             np.outer(gain, operator.c),
             np.outer(operator.e, pick),
-            integrating=integrating,
+            integral_of=signal if integral else -1,
         )
         self.d[:, signal] += gain * operator.f
 
-    def append(self, a: Floats, b: Floats, c: Floats, e: Floats, *, integrating: bool = False) -> None:
+    def append(self, a: Sparse, b: Floats, c: Floats, e: Floats, *, integral_of: int = -1) -> None:
         """Add states."""
         self._blocks.append((a, b, c, e))
-        self._integrating += [integrating] * len(a)
+        self._integral_of += [integral_of] * len(b)
 
     def controller(self, period: float, delay: float) -> DiscreteController:
         """Return all of them as one."""
-        n, m = len(self._integrating), self.m
-        a, b, c, e = np.zeros((n, n)), np.zeros((n, 2 * m)), np.zeros((m, n)), np.zeros((n, 2 * m))
-        first = 0
-        for part in self._blocks:
-            here = slice(first, first + len(part[0]))
-            a[here, here], b[here], c[:, here], e[here] = part
-            first = here.stop
-        return DiscreteController(a, b, c, self.d, e, np.array(self._integrating, dtype=bool), period, delay)
+        m = self.m
+        none = np.zeros((0, 2 * m))
+        a, b, c, e = zip((csr_array((0, 0)), none, none.T[:m], none), *self._blocks, strict=True)
+        whole = (csr_array(block_diag(a)), np.concatenate(b), np.concatenate(c, axis=1), self.d, np.concatenate(e))
+        return DiscreteController(*whole, np.array(self._integral_of, dtype=int), period, delay)
 
 
 def dimensionless_time(plant: StatePlant, seconds: float) -> float:

@@ -96,12 +96,14 @@ def closed_loop(plant: StatePlant, controller: DiscreteController) -> Floats:
     """Return the matrix that takes [x, controller's state, controls on their way] on by a period.
 
     Raises:
-        UnsupportedError: the plant is not linear.
+        UnsupportedError: the plant is not linear, or the loop has more states than its poles can be computed of.
     """
     loop = SampledResponse(plant, controller)
     n, q, m = len(loop.transition), controller.n_states, controller.n_controls
     waiting = int(loop.whole) + bool(loop.past.any())
     size = n + q + m * waiting
+    if size > _MOST_STATES:
+        raise UnsupportedError(f"a sampled loop of {size} states; margins are for {_MOST_STATES} at most")
     matrix, demand = np.zeros((size, size)), np.zeros((m, size))
     demand[:, :n], demand[:, n : n + q] = controller.d, controller.c
     queue = [demand] + [np.eye(m, size, n + q + m * i) for i in range(waiting)]
@@ -109,7 +111,7 @@ def closed_loop(plant: StatePlant, controller: DiscreteController) -> Floats:
     matrix[:n] += loop.present @ queue[int(loop.whole)]
     if loop.past.any():
         matrix[:n] += loop.past @ queue[int(loop.whole) + 1]
-    matrix[n : n + q, :n], matrix[n : n + q, n : n + q] = controller.b, controller.a
+    matrix[n : n + q, :n], matrix[n : n + q, n : n + q] = controller.b, controller.a.toarray()
     for i in range(waiting):
         matrix[n + q + m * i : n + q + m * (i + 1)] = queue[i]
     return matrix
@@ -126,8 +128,6 @@ def sampled_margins(plant: StatePlant, controller: DiscreteController) -> Margin
         UnsupportedError: the plant is not linear, or the loop has more states than its poles can be computed of.
     """
     matrix = closed_loop(plant, controller)
-    if len(matrix) > _MOST_STATES:
-        raise UnsupportedError(f"a sampled loop of {len(matrix)} states; margins are for {_MOST_STATES} at most")
     stable = bool(np.abs(np.linalg.eigvals(matrix)).max() < 1.0)
     found: dict[str, Any] = {field.name: np.nan for field in fields(Margins)} | {"stable": stable}
     if not stable:

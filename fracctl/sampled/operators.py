@@ -7,8 +7,12 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.sparse import csr_array, diags_array
 
 from fracctl.arrays import Complexes, Floats
+
+Sparse = csr_array
+"""A matrix by its rows, without zeros: a register of thousands of samples is nothing but zeros beside its ones."""
 
 
 @dataclass(frozen=True)
@@ -21,7 +25,7 @@ class SampledOperator:
     from there on, and an integral is 0.
     """
 
-    a: Floats
+    a: Sparse
     """A, (n, n), lower triangular."""
     b: Floats
     """b, (n,)."""
@@ -60,25 +64,27 @@ class Memory(Protocol):
         ...
 
 
-def substituted(a: Floats, b: Floats, z: Complexes) -> Complexes:
+def substituted(a: Sparse, b: Floats, z: Complexes) -> Complexes:
     """Return (z I - A)⁻¹ B for a lower triangular A (n, n), B (n, m) and z (k,), (k, n, m), by forward substitution."""
-    x = np.zeros((len(z), *b.shape), dtype=np.complex128)
+    x, diagonal = np.zeros((len(z), *b.shape), dtype=np.complex128), a.diagonal()
     for i in range(len(b)):
-        known = np.flatnonzero(a[i, :i])
-        x[:, i] = (b[i] + np.tensordot(x[:, known], a[i, known], axes=(1, 0))) / (z - a[i, i])[:, None]
+        row = slice(a.indptr[i], a.indptr[i + 1])
+        before = a.indices[row] < i
+        known, factors = a.indices[row][before], a.data[row][before]
+        x[:, i] = (b[i] + np.tensordot(x[:, known], factors, axes=(1, 0))) / (z - diagonal[i])[:, None]
     return x
 
 
 def difference(period: float) -> SampledOperator:
     """Return the backward difference (y_k - y_{k-1})/h, D¹ to first order."""
     one = np.ones(1)
-    return SampledOperator(np.zeros((1, 1)), one, -one / period, 1.0 / period, one)
+    return SampledOperator(csr_array((1, 1)), one, -one / period, 1.0 / period, one)
 
 
 def trapezoid(period: float) -> SampledOperator:
     """Return the integral of a signal that is linear between samples."""
     one = np.ones(1)
-    return SampledOperator(np.eye(1), one * period, one, 0.5 * period, -0.5 * period * one)
+    return SampledOperator(csr_array(np.eye(1)), one * period, one, 0.5 * period, -0.5 * period * one)
 
 
 def lags(rates: Floats, weights: Floats, direct: float, period: float) -> SampledOperator:
@@ -94,7 +100,7 @@ def lags(rates: Floats, weights: Floats, direct: float, period: float) -> Sample
     """
     decay, earlier, present = first_order_hold(rates, period)
     return SampledOperator(
-        np.diag(decay), earlier + decay * present, weights, direct + float(weights @ present), -present
+        csr_array(diags_array(decay)), earlier + decay * present, weights, direct + float(weights @ present), -present
     )
 
 

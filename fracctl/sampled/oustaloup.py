@@ -61,7 +61,7 @@ class Oustaloup:
         The memory of a constant is at rest, with the filter's own ω_b^α times the constant as output.
         """
         operator = self._sampled(order, period)
-        rest = operator.b / (1.0 - np.diag(operator.a))
+        rest = operator.b / (1.0 - operator.a.diagonal())
         return SampledOperator(operator.a, operator.b, operator.c, operator.f, rest)
 
     def integral(self, order: float, period: float) -> SampledOperator:

@@ -41,8 +41,9 @@ def simulate(
     there is none. Between its changes a linear plant is exact (matrix exponential), another is integrated by DOP853.
 
     D^α ξ remembers what was measured, not what was asked of the thrusters, so a limit does not wind its memory up;
-    integrals of the position it does. ``hold_integrals`` keeps these as they are in a period at a limit (conditional
-    integration), ``restart`` begins the whole memory anew at the present measurement, as at switch-on.
+    integrals of the position it does. ``hold_integrals`` keeps one as it is in a period in which it would drive a
+    control at its limit further (conditional integration), ``restart`` begins the whole memory of a member at a limit
+    anew at the present measurement, as at switch-on.
 
     Args:
         plant: with states [ξ, ξ'].
@@ -58,7 +59,7 @@ def simulate(
         numbers: of the members, for their seeds, (b,); None for 0 to b - 1.
 
     Raises:
-        ArgumentError: a shape is wrong or a word unknown.
+        ArgumentError: a shape is wrong or a word unknown, or the thrusters cannot give their impulse bit in a period.
     """
     m = plant.n_controls
     start = _states(plant, initial_state)
@@ -75,8 +76,7 @@ def simulate(
     errors = told.errors(seed, members, m, -(-count // told.every))
     recorded = None if earlier is None else _recorded(earlier, len(start), 2 * m)
     thrusters = actuator or Actuator()
-    if thrusters.saturation is not None:
-        thrusters.saturation.check(m)
+    thrusters.check(m, controller.period)
 
     x, states, commands = start, np.empty((count + 1, *start.shape)), np.zeros((count, len(start), m))
     limits = np.zeros(len(start))
@@ -90,8 +90,10 @@ def simulate(
             memory = controller.start(measured, recorded)
         following, demand = controller.step(memory, measured)
         commands[k], limited = thrusters(demand, controller.period)
-        limits += limited
-        memory = _kept(controller, memory, following, limited, measured, anti_windup)
+        limits += limited.any(axis=1)
+        if anti_windup != "none" and limited.any():
+            following = _kept(controller, memory, following, demand, limited, measured, anti_windup)
+        memory = following
         states[k + 1] = x = move(k, x, commands)
     return SampledTrajectory(
         plant,
@@ -123,17 +125,22 @@ def _kept(
     controller: DiscreteController,
     memory: Floats,
     following: Floats,
+    demand: Floats,
     limited: Booleans,
     measured: Floats,
     anti_windup: AntiWindup,
 ) -> Floats:
     """Return the next states, with what a limit does to them."""
-    if anti_windup == "none" or not limited.any():
-        return following
-    if anti_windup == "hold_integrals":
-        return np.where(limited[:, None] & controller.integrating, memory, following)
-    anew, _ = controller.step(controller.start(measured), measured)
-    return np.where(limited[:, None], anew, following)
+    if anti_windup == "restart":
+        anew, _ = controller.step(controller.start(measured), measured)
+        return np.where(np.any(limited, axis=1, keepdims=True), anew, following)
+    kept = following.copy()
+    for position in range(controller.n_controls):
+        own = np.flatnonzero(controller.integral_of == position)
+        driven = ((following - memory)[:, None, own] * controller.c[:, own]).sum(axis=2)
+        further = np.any(limited & (driven * demand > 0.0), axis=1, keepdims=True)
+        kept[:, own] = np.where(further, memory[:, own], following[:, own])
+    return kept
 
 
 def _states(plant: StatePlant, initial_state: ArrayLike) -> Floats:

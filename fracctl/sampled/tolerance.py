@@ -16,13 +16,13 @@ from fracctl.loop import ClosedLoop
 from fracctl.sampled.exponentials import Exponentials
 from fracctl.sampled.operators import Memory, SampledOperator
 from fracctl.sampled.oustaloup import Oustaloup
-from fracctl.sampled.window import Window, grunwald_letnikov_weights
+from fracctl.sampled.window import MOST_SAMPLES, Window, grunwald_letnikov_weights
 from fracctl.stability.margins import margins
 
 Kind = Literal["window", "oustaloup", "exponentials"]
 Band = tuple[float, float]
 _POINTS = 81
-_MOST_SAMPLES, _MOST_POLES = 200_000, 60
+_MOST_POLES = 60
 _DECADE = 10.0
 _REACHES = tuple(10.0 ** (0.25 * k) for k in range(25))
 """How far beyond the band filters and modes may reach, in both directions."""
@@ -97,7 +97,11 @@ def choose_memory(kind: Kind, orders: Sequence[float], period: float, band: Band
     for memory in candidates(orders, period, band, tolerance):
         if max(response_error(memory, order, period, band) for order in orders) <= tolerance:
             return memory
-    raise ArgumentError("tolerance", tolerance, f"is below what a memory of kind '{kind}' reaches in this band")
+    reached = f"is below what a memory of kind '{kind}' reaches in this band"
+    if kind != "window":
+        raise ArgumentError("tolerance", tolerance, reached)
+    cure = "allow more, or take another kind"
+    raise ArgumentError("tolerance", tolerance, f"{reached} with {MOST_SAMPLES} samples", cure)
 
 
 def memory_for(loop: ClosedLoop, kind: Kind, period: float, tolerance: float, feed: str = "position") -> Memory:
@@ -165,12 +169,11 @@ def _windows(orders: Sequence[float], period: float, band: Band, tolerance: floa
     def fails(samples: int) -> bool:
         return max(response_error(Window(samples), order, period, band) for order in orders) > tolerance
 
-    high = 2
+    low, high = 1, 2
     while fails(high):
-        high *= 2
-        if high > _MOST_SAMPLES:
+        if high == MOST_SAMPLES:
             return
-    low = high // 2
+        low, high = high, min(2 * high, MOST_SAMPLES)
     while high - low > 1:
         middle = (low + high) // 2
         low, high = (middle, high) if fails(middle) else (low, middle)

@@ -5,10 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse import csr_array, eye_array
 
 from fracctl.arrays import Floats
 from fracctl.errors import ArgumentError
 from fracctl.sampled.operators import SampledOperator
+
+MOST_SAMPLES = 20_000
+"""Of a window: every step moves all of them, on three axes of every flight."""
 
 
 @dataclass(frozen=True)
@@ -22,10 +26,10 @@ class Window:
     states and M multiply-adds; the error is O(h).
 
     Args:
-        samples: M ≥ 2, the present one included.
+        samples: M, the present one included; 2 to `MOST_SAMPLES`.
 
     Raises:
-        ArgumentError: there are fewer samples.
+        ArgumentError: there are fewer samples, or more.
     """
 
     samples: int
@@ -33,6 +37,11 @@ class Window:
     def __post_init__(self) -> None:
         if self.samples < 2:
             raise ArgumentError("samples", self.samples, "must be at least 2")
+        if self.samples > MOST_SAMPLES:
+            cure = "sum of exponentials or a filter of Oustaloup's"
+            raise ArgumentError(
+                "samples", self.samples, f"must be at most {MOST_SAMPLES}", f"a longer memory is a {cure}"
+            )
 
     def derivative(self, order: float, period: float) -> SampledOperator:
         """Return D^order of a signal, order in (0, 1], Caputo from the oldest sample."""
@@ -54,4 +63,6 @@ def grunwald_letnikov_weights(order: float, count: int) -> Floats:
 def _register(weights: Floats, first: Floats) -> SampledOperator:
     """Return Σ_k w_k y_{n-k}, the states y_{n-1}, y_{n-2}, …."""
     length = len(weights) - 1
-    return SampledOperator(np.eye(length, k=-1), np.eye(length)[0], weights[1:], float(weights[0]), first)
+    newest = np.concatenate([[1.0], np.zeros(length - 1)])
+    register = csr_array(eye_array(length, k=-1))
+    return SampledOperator(register, newest, weights[1:], float(weights[0]), first)

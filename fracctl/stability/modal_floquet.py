@@ -58,7 +58,11 @@ class MemoryMultipliers:
 
 
 def memory_multipliers(
-    loop: ClosedLoop, period: float | None = None, kernel_tolerance: float = 1e-6, tolerance: float = 1e-7
+    loop: ClosedLoop,
+    period: float | None = None,
+    kernel_tolerance: float = 1e-6,
+    tolerance: float = 1e-7,
+    member: int | None = None,
 ) -> MemoryMultipliers:
     """Return the eigenvalues of the monodromy matrix over [ξ, ξ', z, φ_j].
 
@@ -74,24 +78,25 @@ def memory_multipliers(
     for those that decide on stability, late for poles next to the cut (-∞, 0], where the modes have poles of their own.
 
     Args:
-        loop: a single loop of a plant of second order that is linear in states and controls (Jacobians at 0 are taken),
+        loop: of a plant of second order that is linear in states and controls (Jacobians at 0 are taken),
             under a linear law whose orders of positions are at most 1, of other states at most 0.
         period: T; None for the plant's own.
         kernel_tolerance: relative error of the kernel; fewer modes or more.
         tolerance: of the steps: they are halved until twice no multiplier changes by more, over its size
             where that is above 1, or until a period has 1024; then `converged` is False. Coefficients that jump
             converge fast only where they jump between steps, as at fractions T/2^k of the period.
+        member: which one of a batch; None for a single loop.
 
     Raises:
-        ArgumentError: the loop is a batch, or there is no period.
+        ArgumentError: the loop is a batch and no member is named, or there is no period.
         UnsupportedError: the law has higher orders, or is not linear.
     """
-    if loop.batch is not None:
-        raise ArgumentError("loop", f"a batch of {loop.batch}", "must be a single loop")
+    if loop.batch is not None and member is None:
+        raise ArgumentError("loop", f"a batch of {loop.batch}", "must be a single loop", "name one by `member`")
     found = getattr(loop.plant, "period", None) if period is None else period
     if found is None or not found > 0.0:
         raise ArgumentError("period", found, "must be a positive number, for the plant has none of its own")
-    form = _ModeForm(loop, float(found), kernel_tolerance)
+    form = _ModeForm(loop, member or 0, float(found), kernel_tolerance)
     values, steps, gap = _refined(form, tolerance)
     relaxing = (np.abs(values.imag) <= _REAL * np.abs(values)) & (values.real < 1.0) & (values.real > 0.0)
     isolated = (np.abs(values) > _NOTHING) & ~relaxing if form.modes else np.ones(len(values), dtype=bool)
@@ -101,19 +106,20 @@ def memory_multipliers(
 class _ModeForm:
     """X' = A(t) X for X = [ξ, ξ', z, φ] of a loop."""
 
-    def __init__(self, loop: ClosedLoop, period: float, tolerance: float) -> None:
+    def __init__(self, loop: ClosedLoop, member: int, period: float, tolerance: float) -> None:
         self.loop, self.period = loop, period
         m = loop.plant.n_controls
-        law = signals(loop.law_terms, m)
+        law = signals(loop.law_terms, m).take(np.array([member]))
         self._m, q = m, law.n_auxiliary
         states = 2 * m + q
         place = {**{i: i for i in range(2 * m)}, **{3 * m + i: 2 * m + i for i in range(q)}}
-        if any(int(source) not in place for source in law.sources):
+        used = law.gains[0].any(axis=0)
+        sources, orders, gains = law.sources[used], law.orders[used, 0], law.gains[0][:, used]
+        if any(int(source) not in place for source in sources):
             raise UnsupportedError(
                 "memory_multipliers takes orders up to 1 of positions and 0 of other states; reduce them"
             )
-        orders, gains = law.orders[:, 0], law.gains[0]
-        deep = [(place[int(s)], float(p)) for s, p in zip(law.sources, orders, strict=True)]
+        deep = [(place[int(s)], float(p)) for s, p in zip(sources, orders, strict=True)]
         kinds = sorted({kind for kind in deep if kind[1] > 0.0})
         rates = {p: _modes(p, period, tolerance) for _, p in kinds}
         first = dict(zip(kinds, states + np.cumsum([0, *(len(rates[p][0]) for _, p in kinds)]), strict=False))

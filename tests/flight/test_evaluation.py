@@ -217,7 +217,15 @@ REFUSED = [
     (["evaluation.truth={type: hcw}"], "evaluation.truth.type = hcw: must be motion about a leader"),
     (["evaluation.truth={type: relative_motion, eccentricity: 2}"], "evaluation.truth.eccentricity = 2: must lie in"),
     (["evaluation.dispersions.offset_x_m=[normal, 0, 1]"], "must be one of offset_u_m, offset_v_m"),
+    (
+        ["evaluation.thrusters.impulse_bit_n_s=400"],
+        "impulse_bit_n_s = 400: is more than the thrusters give in a period",
+    ),
     (["evaluation.memory_samples=20"], "evaluation.memory_samples = 20: goes with memory = window"),
+    (
+        ["evaluation.memory=window", "evaluation.memory_samples=50000"],
+        "evaluation.memory_samples = 50000: must be at most",
+    ),
     (["evaluation.delay=-1"], "evaluation.delay = -1"),
     (["survey=out_of_plane_gains"], "several laws have their own values"),
     (["evaluation.laws.pd.values.k_p_x=1"], "evaluation.laws.pd.values = k_p_x: must name parameters"),
@@ -230,6 +238,12 @@ def test_refusals(words: list[str], sentence: str) -> None:
     with pytest.raises(ConfigurationError) as caught:
         built(words)
     assert sentence in str(caught.value)
+
+
+def test_a_tolerance_that_asks_for_too_long_a_window_says_so() -> None:
+    flights = built([*ONE, "evaluation.memory=window", "evaluation.memory_tolerance=5e-6"])
+    with pytest.raises(ArgumentError, match=r"`memory_tolerance` is below .* 20000 samples, but is 5e-06; allow more"):
+        flights.fly("ic1", "sampled", [0], {"law_number": 1.0})
 
 
 def test_a_look_at_no_flight_is_refused(evaluation: FlightEvaluation) -> None:

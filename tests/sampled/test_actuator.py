@@ -17,7 +17,9 @@ DEMAND = np.array([[3.0, -4.0], [0.05, 0.3], [-0.2, 0.0]])
 def test_by_axis_and_by_norm() -> None:
     control, limited = Actuator(Saturation(1.0, by="axis"))(DEMAND, 0.1)
     np.testing.assert_array_equal(control, [[1.0, -1.0], [0.05, 0.3], [-0.2, 0.0]])
-    assert limited.tolist() == [True, False, False]
+    assert limited.tolist() == [[True, True], [False, False], [False, False]]
+    _, limited = Actuator(Saturation(3.5, by="axis"))(DEMAND, 0.1)
+    assert limited[0].tolist() == [False, True]
     control, _ = Actuator(Saturation(1.0))(DEMAND, 0.1)
     np.testing.assert_allclose(control, [[0.6, -0.8], [0.05, 0.3], [-0.2, 0.0]], rtol=1e-15)
 
@@ -30,9 +32,46 @@ def test_deadband_and_impulse_bit() -> None:
     np.testing.assert_allclose(control, [[3.0, -4.0], [0.0, 0.3], [-0.3, 0.0]], rtol=1e-15)
 
 
-def test_a_limit_below_the_bit_still_fires_bits() -> None:
-    control, _ = Actuator(Saturation(0.2, by="axis"), impulse_bit=0.03)(DEMAND, 0.1)
-    np.testing.assert_allclose(control[0], [0.3, -0.3], rtol=1e-15)
+def test_an_engine_that_is_turned_fires_its_bit_in_the_direction_of_the_demand() -> None:
+    demand = np.array([[3.0, -4.0], [0.15, 0.2], [0.06, -0.08], [0.0, 0.0]])
+    control, _ = Actuator(Saturation(1.0), impulse_bit=0.03)(demand, 0.1)
+    np.testing.assert_allclose(control, [[0.6, -0.8], [0.18, 0.24], [0.0, 0.0], [0.0, 0.0]], rtol=1e-15)
+
+
+def test_a_bit_beyond_the_limit_is_refused() -> None:
+    law = SampledLaw(PD(1.0, 1.0), Window(2), 0.1)
+    for limit in (Saturation(0.2, by="axis"), Saturation(0.2)):
+        with pytest.raises(ArgumentError, match=r"`impulse_bit` must be at most .* in a period, 0.02, but is 0.03"):
+            simulate(LinearPlant(0.0), law, [1.0, 0.0], 1.0, actuator=Actuator(limit, impulse_bit=0.03))
+        simulate(LinearPlant(0.0), law, [1.0, 0.0], 1.0, actuator=Actuator(limit, impulse_bit=0.02))
+
+
+def test_a_limit_holds_the_integrals_that_drive_it_and_no_others() -> None:
+    """On two uncoupled axes, the one at its limit flies as if it were alone, and so does the other."""
+    both, one = LinearPlant(np.zeros((2, 2))), LinearPlant(0.0)
+    law = {m: SampledLaw(PID(np.eye(m), 0.3 * np.eye(m), 2.0 * np.eye(m), 0.1), Window(2), 0.05) for m in (1, 2)}
+    thrusters = Actuator(Saturation(0.2, by="axis"))
+    far, near = [5.0, 0.0], [0.02, 0.0]
+    flown = [simulate(one, law[1], s, 60.0, actuator=thrusters, anti_windup="hold_integrals") for s in (far, near)]
+    start = [far[0], near[0], 0.0, 0.0]
+    together = simulate(both, law[2], start, 60.0, actuator=thrusters, anti_windup="hold_integrals")
+    assert flown[0].saturated_share[0] > 0.1
+    assert flown[1].saturated_share[0] == 0.0
+    for axis, alone in enumerate(flown):
+        np.testing.assert_allclose(together.states[:, axis], alone.states[:, 0], rtol=0.0, atol=1e-12)
+
+
+def test_an_integral_that_leads_away_from_the_limit_goes_on() -> None:
+    """While the damping alone keeps the thrusters at their limit, an error of the other sign is integrated."""
+    law, limit = SampledLaw(PID(0.0, 0.01, 2.0, 0.1), Window(2), 0.05, feed="velocity"), Actuator(Saturation(0.2))
+    flights = {
+        (place, word): simulate(LinearPlant(0.0), law, [place, 1.0], 10.0, actuator=limit, anti_windup=word)
+        for place in (-5.0, 5.0)
+        for word in ("none", "hold_integrals")
+    }
+    assert all(flight.saturated_share[0] > 0.4 for flight in flights.values())
+    np.testing.assert_array_equal(flights[-5.0, "none"].states, flights[-5.0, "hold_integrals"].states)
+    assert np.abs(flights[5.0, "none"].controls - flights[5.0, "hold_integrals"].controls).max() > 1e-3
 
 
 def test_a_deadband_leaves_a_drift_alone() -> None:

@@ -130,7 +130,9 @@ def test_files_hold_the_same_controller(tmp_path: Path) -> None:
     stored = np.load(tmp_path / "new" / "controller.npz")
     a = np.zeros((told["states"], told["states"]))
     a[told["A"]["rows"], told["A"]["columns"]] = told["A"]["values"]
-    np.testing.assert_array_equal(a, stored["A"])
+    np.testing.assert_array_equal(a, exported.controller.a.toarray())
+    for name, entries in told["A"].items():
+        np.testing.assert_array_equal(entries, stored[f"A_{name}"])
     for name in "BCDE":
         np.testing.assert_array_equal(told[name], stored[name])
     assert told["period_s"] == pytest.approx(10.0)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 import numpy as np
 import pytest
 
@@ -47,6 +49,21 @@ def test_states_and_operations_are_those_of_the_sums() -> None:
     oustaloup = SampledLaw(law, Oustaloup(0.1, 10.0, 5), STEP).discrete(1)
     assert (oustaloup.n_states, oustaloup.operations) == (5, 5 + 5 + 5 + 1)
     assert SampledLaw(PD(1.0, 1.0), Window(9), STEP, feed="velocity").discrete(1).n_states == 0
+
+
+def test_a_window_of_thousands_of_samples_on_three_axes_takes_little_memory() -> None:
+    law, samples = PDAlpha(np.eye(3), np.eye(3), [0.9, 0.9, 0.9]), 8000
+    tracemalloc.start()
+    controller = SampledLaw(law, Window(samples), STEP, feed="velocity").discrete(3)
+    states = controller.start(np.ones((1, 6)))
+    for _ in range(50):
+        states, control = controller.step(states, np.ones((1, 6)))
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert controller.n_states == 3 * (samples - 1)
+    weights = np.cumprod(np.append(1.0, 1.0 + (0.1 - 1.0) / np.arange(1, 50)))
+    np.testing.assert_allclose(control, np.full((1, 3), -1.0 - STEP**0.1 * weights.sum()), rtol=1e-12)
+    assert peak < 50e6  # its matrix with all zeros would take 4.6e9
 
 
 def test_a_recorded_memory_goes_on_where_it_was() -> None:

@@ -20,6 +20,7 @@ from fracctl.sampled import (
     response_error,
 )
 from fracctl.sampled.tolerance import Kind
+from fracctl.sampled.window import MOST_SAMPLES
 
 BAND = (0.3, 20.0)
 PERIOD = 0.01
@@ -83,6 +84,17 @@ def test_the_band_lies_around_the_crossover() -> None:
     assert high / low == pytest.approx(100.0)
     with pytest.raises(UnsupportedError, match="give a band"):
         loop_band(fc.ClosedLoop(HCWOutOfPlane(), PD(0.0, 0.0)))
+
+
+def test_a_window_may_be_as_long_as_the_longest() -> None:
+    longest = response_error(Window(MOST_SAMPLES), 0.91, PERIOD, BAND)
+    found = choose_memory("window", [0.91], PERIOD, BAND, longest * 1.0001)
+    assert isinstance(found, Window)
+    assert 2**14 < found.samples <= MOST_SAMPLES  # doubling alone would end at the first
+    with pytest.raises(ArgumentError, match=f"with {MOST_SAMPLES} samples"):
+        choose_memory("window", [0.91], PERIOD, BAND, 0.99 * longest)
+    with pytest.raises(ArgumentError, match="at most"):
+        Window(MOST_SAMPLES + 1)
 
 
 def test_the_memory_for_a_loop() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -11,6 +13,7 @@ import fracctl as fc
 from fracctl.controllers.linear import LinearLawTerms
 from fracctl.errors import ArgumentError, UnsupportedError
 from fracctl.fractional.terms import FractionalTerm
+from fracctl.measures.floquet_multiplier import FloquetMultiplier
 from fracctl.plants import HCW, HCWOutOfPlane, LinearPlant, TschaunerHempel
 from fracctl.stability import memory_multipliers
 
@@ -139,6 +142,52 @@ def test_multipliers_that_have_not_converged_decide_nothing() -> None:
     assert (found.stable, found.converged, found.steps) == (None, False, 1024)
     assert 1e-7 < np.abs(found.values - exact[:, None]).min(axis=1).max() < found.gap < 2e-2
     assert memory_multipliers(loop, period=TURN, tolerance=2e-2).stable is False
+
+
+def test_a_loop_with_periodic_coefficients_is_judged_by_its_multipliers() -> None:
+    for law, stable in ((FAST, True), (SLOW, False)):
+        loop = fc.ClosedLoop(TschaunerHempel(eccentricity=0.1), law)
+        verdict, found = fc.stability.assess(loop), memory_multipliers(loop)
+        assert verdict.stable is stable
+        assert np.exp(TURN * verdict.poles[0].real) == pytest.approx(found.largest)
+        assert "Floquet" in verdict.method
+    with pytest.raises(
+        UnsupportedError, match=r"constant coefficients is asked for, .* with periodic coefficients and"
+    ):
+        loop.system  # noqa: B018
+
+
+def test_a_circular_orbit_has_the_verdict_of_the_poles() -> None:
+    for law in (FAST, SLOW):
+        about = fc.stability.assess(fc.ClosedLoop(TschaunerHempel(), law))
+        assert about.stable is fc.stability.assess(fc.ClosedLoop(HCW(), law)).stable
+
+
+def test_the_measure_takes_the_members_of_a_batch() -> None:
+    gains = [0.3, 1.0]
+    eye = np.eye(3)
+    plant = TschaunerHempel(eccentricity=0.1)
+    batch = fc.controllers.PDAlpha(np.multiply.outer(gains, 3.0 * eye), np.multiply.outer(gains, 2.0 * eye), [0.9] * 3)
+    found = FloquetMultiplier().of_loop(fc.ClosedLoop(plant, batch))["floquet_multiplier"]
+    singles = [fc.controllers.PDAlpha(3.0 * g * eye, 2.0 * g * eye, [0.9] * 3) for g in gains]
+    expected = [memory_multipliers(fc.ClosedLoop(plant, law), kernel_tolerance=1e-4).largest for law in singles]
+    np.testing.assert_allclose(found, expected, rtol=1e-9)
+    assert found[0] != pytest.approx(found[1])
+
+
+def test_a_run_has_the_verdict_in_its_rows_and_keeps_to_a_limit(tmp_path: Path) -> None:
+    words = [
+        *("plant=tschauner_hempel", "evaluation.largest_control=null", "figures=null", "horizon_periods=2"),
+        *(f"output_dir={tmp_path}", "+measures.floquet_multiplier={kernel_tolerance: 0.01}"),
+    ]
+    row = fc.run("elliptic_ic1", [*words, "constraints.floquet_multiplier='<= 0.5'"]).evaluations.iloc[0]
+    assert (bool(row["stable"]), row["status"]) == (True, "ok")
+    assert 0.0 < row["floquet_multiplier"] < 0.5
+    tight = fc.run("elliptic_ic1", [*words, "constraints.floquet_multiplier='<= 1e-9'"]).evaluations
+    assert tight["status"].tolist() == ["beyond_limits"]
+    away = fc.run("elliptic_ic1", [*words, *(f"controller.k_p_{axis}=-1" for axis in "xyz")]).evaluations.iloc[0]
+    assert away["floquet_multiplier"] > 1.0
+    assert (bool(away["stable"]), away["status"]) == (False, "unstable")
 
 
 def test_what_is_refused() -> None:
