@@ -13,7 +13,7 @@ from fracctl.arrays import Array, Floats, joined
 from fracctl.dispersions import SAMPLE
 from fracctl.errors import ArgumentError, UnsupportedError, suggestion
 from fracctl.evaluation import COUNTERS, LAW_NUMBER, Conclusion, Evaluation
-from fracctl.flight import beside, conclusion
+from fracctl.flight import beside, conclusion, uncertain
 from fracctl.flight.measured import measured, names, takes
 from fracctl.flight.names import CERTAIN, STAGES, Stage
 from fracctl.flight.stages import Flown, Sampling, Surroundings
@@ -59,6 +59,8 @@ class FlightEvaluation(Evaluation):
     first_sample: int = 0
     """Number of the first; any sample can be flown again by its number."""
     seed: int = 0
+    sizes: Mapping[str, uncertain.Size] = field(default_factory=dict)
+    """What per cents of offsets are of, by initial condition; those of the states where none are given."""
 
     @property
     def has_poles(self) -> bool:
@@ -139,13 +141,13 @@ class FlightEvaluation(Evaluation):
     def __call__(self, design: Mapping[str, Floats]) -> dict[str, Array]:
         """Return the rows of b design points: all points of the first initial condition, then of the next."""
         points = self._points({name: np.asarray(values, dtype=np.float64) for name, values in design.items()})
-        uncertain = {n: np.where(points.stages == "dispersed", v, np.nan) for n, v in points.drawn.items()}
+        drawn = {n: np.where(points.stages == "dispersed", v, np.nan) for n, v in points.drawn.items()}
         own: dict[str, Array] = {
             **points.designs,
             STAGE: points.stages,
             FLIGHT: points.numbers,
             SAMPLE: points.samples,
-        } | uncertain
+        } | drawn
         if self.laws:
             own[LAW] = np.array(list(self.laws), dtype=object)[points.designs[LAW_NUMBER].astype(int)]
         tables = []
@@ -184,8 +186,11 @@ class FlightEvaluation(Evaluation):
                     yield at, self._ideal(loop, condition)
                 else:
                     drawn = {name: values[at] for name, values in points.drawn.items()}
-                    met = self.around.of(stage, self.initial_conditions[condition], drawn, len(at))
+                    met = self._met(condition, stage, drawn, len(at))
                     yield at, self._measured(self._flown(controller, met, points.samples[at]), condition)
+
+    def _met(self, condition: str, stage: Stage, drawn: Mapping[str, Floats], count: int) -> Flown:
+        return self.around.of(stage, self.initial_conditions[condition], drawn, count, self.sizes.get(condition))
 
     def _flown(self, controller: DiscreteController, met: Flown, samples: Floats) -> SampledTrajectory:
         return simulate(
@@ -219,10 +224,8 @@ class FlightEvaluation(Evaluation):
             raise ArgumentError("stage", stage, f"must be one of {', '.join(STAGES[1:])}")
         numbers = np.array(list(samples), dtype=np.float64)
         controller = self.sampling.law(self.loop(design or {})).discrete(self.plant.n_controls)
-        nominal = self.initial_conditions[initial_condition]
-        return self._flown(
-            controller, self.around.of(stage, nominal, self.around.drawn(numbers), len(numbers)), numbers
-        )
+        met = self._met(initial_condition, stage, self.around.drawn(numbers), len(numbers))
+        return self._flown(controller, met, numbers)
 
     def _ideal(self, loop: ClosedLoop, condition: str) -> dict[str, Array]:
         found = self.solver.solve(loop, self.initial_conditions[condition][None], self.horizon)

@@ -111,22 +111,39 @@ class Surroundings:
         """Return the uncertain numbers of samples (b,), (b,) each."""
         return draws(self.dispersions, self.seed, [int(sample) for sample in samples])
 
-    def of(self, stage: Stage, nominal: Floats, drawn: Mapping[str, Floats], count: int) -> Flown:
-        """Return what `count` flights of a stage from a nominal state (n,) meet; only the last stage is uncertain."""
+    def of(
+        self,
+        stage: Stage,
+        nominal: Floats,
+        drawn: Mapping[str, Floats],
+        count: int,
+        size: uncertain.Size | None = None,
+    ) -> Flown:
+        """Return what `count` flights of a stage from a nominal state (n,) meet; only the last stage is uncertain.
+
+        Args:
+            stage: which.
+            nominal: x(0), dimensionless.
+            drawn: what is uncertain, (b,) each.
+            count: b.
+            size: what per cents of offsets are of, as `fracctl.flight.uncertain.starts` takes it.
+        """
         states = np.repeat(nominal[None], count, axis=0)
         if stage in CERTAIN:
             return Flown(self.plant, states)
         truth = self.plant if stage == "noisy" or self.truth is None else self.truth
         met = Flown(truth, states, self.actuator, self.navigation)
-        return self._dispersed(met, nominal, drawn) if stage == "dispersed" and drawn else met
+        if stage != "dispersed" or not drawn:
+            return met
+        return self._dispersed(met, uncertain.starts(self.plant, nominal, drawn, size), drawn)
 
-    def _dispersed(self, met: Flown, nominal: Floats, drawn: Mapping[str, Floats]) -> Flown:
+    def _dispersed(self, met: Flown, states: Floats, drawn: Mapping[str, Floats]) -> Flown:
         plant: Any = met.plant
         own = {name: values for name, values in drawn.items() if name in self._of_truth}
         factor = uncertain.efficiency(self.spacecraft.mass_kg, drawn)
         return Flown(
             plant.dispersed_by(**own) if own else plant,
-            uncertain.starts(self.plant, nominal, drawn),
+            states,
             replace(self.actuator, efficiency=factor),
             self._navigation(drawn),
         )
