@@ -187,7 +187,7 @@ class FlightEvaluation(Evaluation):
                 else:
                     drawn = {name: values[at] for name, values in points.drawn.items()}
                     met = self._met(condition, stage, drawn, len(at))
-                    yield at, self._measured(self._flown(controller, met, points.samples[at]), condition)
+                    yield at, self._measured(self._flown(controller, met, points.samples[at]), met, condition)
 
     def _met(self, condition: str, stage: Stage, drawn: Mapping[str, Floats], count: int) -> Flown:
         return self.around.of(stage, self.initial_conditions[condition], drawn, count, self.sizes.get(condition))
@@ -236,10 +236,10 @@ class FlightEvaluation(Evaluation):
         rows |= {LIMITED: np.zeros(1), "status": status, "stable": found.stable}
         return rows | {"error_estimate": found.error_estimate} | {name: found.counters[name] for name in COUNTERS}
 
-    def _measured(self, flight: SampledTrajectory, condition: str) -> dict[str, Array]:
+    def _measured(self, flight: SampledTrajectory, met: Flown, condition: str) -> dict[str, Array]:
         rows: dict[str, Array] = {}
         for measure in self.measures:
-            rows |= measured(measure, flight)
+            rows |= measured(measure, flight, met.mass_kg)
         b, periods = flight.commands.shape[:2]
         rows |= {LIMITED: 100.0 * flight.saturated_share, "status": self._told(flight.status.copy(), rows, condition)}
         rows |= {"stable": np.full(b, None, dtype=object), "error_estimate": np.full(b, np.nan)}

@@ -146,6 +146,7 @@ class Surroundings:
             states,
             replace(self.actuator, efficiency=factor),
             self._navigation(drawn),
+            drawn.get(uncertain.MASS),
         )
 
     def _navigation(self, drawn: Mapping[str, Floats]) -> Navigation:
@@ -171,3 +172,5 @@ class Flown:
     """At time 0, (b, n)."""
     actuator: Actuator | None = None
     navigation: Navigation | None = None
+    mass_kg: Floats | None = None
+    """Of every flight, (b,); None for that of the spacecraft."""

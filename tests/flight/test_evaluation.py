@@ -244,3 +244,18 @@ def test_the_truth_has_the_chief_of_the_design(evaluation: FlightEvaluation) -> 
 
 def test_bands_are_those_of_the_measure() -> None:
     assert "settling_time_300_m_orbits" in SettlingTimes([300.0]).columns
+
+
+def test_forces_and_propellant_are_those_of_the_mass_that_flies() -> None:
+    """A light spacecraft is accelerated beyond thrust over nominal mass, but no thruster gives more than it can."""
+    words = ["+measures.peak_force={}", "+measures.propellant={}", "spacecraft.isp_s=220", "evaluation.samples=12"]
+    alone = built([*ONE, *words, "evaluation.stages=[nonlinear,dispersed]", "initial_condition.ic1.u=-0.003"])
+    rows = alone(all_points(alone))
+    found = of(rows, "published_pd", "dispersed")
+    given = 8.0 * found["thrust_factor"]
+    np.testing.assert_allclose(found["peak_force_n"], given, rtol=1e-12, err_msg="all are at their limit")
+    np.testing.assert_allclose(found["peak_force_n"], found["mass_kg"] * found["peak_acceleration_mm_s2"] / 1e3)
+    burnt = found["mass_kg"] * -np.expm1(-found["delta_v_m_s"] / (9.80665 * 220.0))
+    np.testing.assert_allclose(found["propellant_kg"], burnt, rtol=1e-12)
+    certain = of(rows, "published_pd", "nonlinear")
+    np.testing.assert_allclose(certain["peak_force_n"], 8.0, rtol=1e-12)
