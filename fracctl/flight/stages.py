@@ -74,8 +74,8 @@ class Surroundings:
     """What flights meet beyond the design: thrusters, navigation, true motion, and what is uncertain of all this.
 
     Raises:
-        ArgumentError: a dispersion has an unknown name, or is of a mass that is not given; the true plant is another
-            kind of motion than that of the design.
+        ArgumentError: a dispersion has an unknown name, draws what cannot be, or is of a mass that is not given; the
+            true plant is another kind of motion than that of the design.
     """
 
     plant: LinearPlant
@@ -94,8 +94,25 @@ class Surroundings:
             allowed = f"must have {self.plant.n_states} states as the plant of the design, but has"
             raise ArgumentError("truth", self.truth, f"{allowed} {self.truth.n_states}; take plant=hcw")
         check_names(self.dispersions, self.known)
+        for name, distribution in self.dispersions.items():
+            self._check_ends(name, distribution)
         if uncertain.MASS in self.dispersions and self.spacecraft.mass_kg is None:
             raise ArgumentError("dispersions", uncertain.MASS, "needs spacecraft.mass_kg, which the law is made for")
+
+    def _check_ends(self, name: str, distribution: Distribution) -> None:
+        """One impossible number would end a run of hundreds of flights."""
+        try:
+            if name in self._of_truth:
+                truth: Any = self.truth
+                truth.dispersed_by(**{name: np.array(distribution.ends)})
+            else:
+                uncertain.check(name, distribution.ends[0])
+        except ArgumentError as error:
+            allowed, cure = f"draws {error.value}, but {name} {error.allowed}", None
+            if distribution.kind == "normal":
+                mean, deviation = distribution.numbers[:2]
+                cure = f"bound it: [normal, {mean:g}, {deviation:g}, lowest, highest]"
+            raise ArgumentError(f"dispersions.{name}", str(distribution), allowed, cure) from error
 
     @property
     def known(self) -> list[str]:
@@ -159,7 +176,7 @@ class Surroundings:
         }
         for name, unit in zip(uncertain.NOISES, (scales.length_m, scales.speed_m_s), strict=True):
             if name in drawn:
-                changed[name.rsplit("_m", 1)[0]] = np.abs(drawn[name])[:, None] / unit
+                changed[name.rsplit("_m", 1)[0]] = drawn[name][:, None] / unit
         return replace(self.navigation, **changed)
 
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from fracctl.arrays import Floats
+from fracctl.errors import ArgumentError
 
 Size = tuple[float, float]
 """Distance and speed of a start, dimensionless."""
@@ -27,6 +28,14 @@ def offset_names(plant: Any) -> list[str]:
 def bias_names(plant: Any) -> list[str]:
     """Names of errors of the navigation that stay over a flight."""
     return [f"{what}_bias_{c}{unit}" for what, unit in (("position", "_m"), ("velocity", "_m_s")) for c in _axes(plant)]
+
+
+def check(name: str, lowest: float) -> None:
+    """Raise ArgumentError unless a mass, a thrust factor or a noise can be as low as this."""
+    if name in (MASS, THRUST) and lowest <= 0.0:
+        raise ArgumentError(name, f"{lowest:g}", "must be positive")
+    if name in NOISES and lowest < 0.0:
+        raise ArgumentError(name, f"{lowest:g}", "must not be negative")
 
 
 def size_of(state: Floats) -> Size:

@@ -217,6 +217,14 @@ REFUSED = [
     (["evaluation.truth={type: hcw}"], "evaluation.truth.type = hcw: must be motion about a leader"),
     (["evaluation.truth={type: relative_motion, eccentricity: 2}"], "evaluation.truth.eccentricity = 2: must lie in"),
     (["evaluation.dispersions.offset_x_m=[normal, 0, 1]"], "must be one of offset_u_m, offset_v_m"),
+    (
+        ["evaluation.dispersions.eccentricity=[normal, 0, 0.01]"],
+        "[normal, 0, 0.01]: draws -0.06, but eccentricity must lie in [0, 1); bound it: [normal, 0, 0.01, lowest, highest]",
+    ),
+    (["evaluation.dispersions.eccentricity=[uniform, 0, 1]"], "draws 1.0, but eccentricity must lie in [0, 1)"),
+    (["evaluation.dispersions.mass_kg=[normal, 500, 100]"], "draws -100, but mass_kg must be positive"),
+    (["evaluation.dispersions.thrust_factor=[choice, 0, 1]"], "draws 0, but thrust_factor must be positive"),
+    (["evaluation.dispersions.position_noise_m=[normal, 1, 1]"], "draws -5, but position_noise_m must not be negative"),
     (["evaluation.memory_samples=20"], "evaluation.memory_samples = 20: goes with memory = window"),
     (["evaluation.delay=-1"], "evaluation.delay = -1"),
     (["survey=out_of_plane_gains"], "several laws have their own values"),
@@ -259,3 +267,12 @@ def test_forces_and_propellant_are_those_of_the_mass_that_flies() -> None:
     np.testing.assert_allclose(found["propellant_kg"], burnt, rtol=1e-12)
     certain = of(rows, "published_pd", "nonlinear")
     np.testing.assert_allclose(certain["peak_force_n"], 8.0, rtol=1e-12)
+
+
+def test_a_bounded_eccentricity_flies() -> None:
+    words = ["evaluation.dispersions.eccentricity=[normal, 0, 0.01, 0, 0.03]", "evaluation.stages=[dispersed]"]
+    alone = built([*ONE, *words, "evaluation.samples=20", "horizon_periods=0.1"])
+    drawn = of(alone(all_points(alone)), "published_pd", "dispersed")["eccentricity"]
+    assert drawn.min() >= 0.0
+    assert drawn.max() <= 0.03
+    assert len(set(drawn.tolist())) == 20

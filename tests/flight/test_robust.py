@@ -80,7 +80,7 @@ def test_unstable_designs_are_told_apart() -> None:
         (["evaluation.dispersions={offset_w_percent: null, offset_w_dot_percent: null}"], "must hold at least one"),
         (["+evaluation.dispersions.mass_kg=[normal, 500, 1]"], "evaluation.dispersions = mass_kg: must be one of"),
         (["evaluation.quantile=0"], "evaluation.quantile = 0"),
-        (["evaluation.dispersions.offset_w_percent=[normal, 0]"], "must hold 'normal' and 2 numbers"),
+        (["evaluation.dispersions.offset_w_percent=[normal, 0]"], "must hold 'normal' and 2 or 4 numbers"),
     ],
 )
 def test_refusals(words: list[str], sentence: str) -> None:
