@@ -62,7 +62,7 @@ class Distribution:
     def draw(self, random: np.random.Generator) -> float:
         """Return one number."""
         if self.kind == "normal":
-            return self._truncated(random) if self._bounds else float(random.normal(*self.numbers))
+            return self._truncated(random) if self._bounds else float(random.normal(self.numbers[0], self.numbers[1]))
         if self.kind == "uniform":
             return float(random.uniform(self.numbers[0], self.numbers[1]))
         return float(random.choice(np.array(self.numbers)))

@@ -37,7 +37,8 @@ def measured(measure: Any, flight: SampledTrajectory, mass_kg: Floats | None = N
     """
     columns = _MEASURED[type(measure)](measure, flight)
     if mass_kg is not None and isinstance(measure, PeakForce | Propellant):  # both are in proportion to it
-        columns = {name: values * mass_kg / measure.spacecraft.mass_kg for name, values in columns.items()}
+        share = mass_kg / np.asarray(measure.spacecraft.mass_kg, dtype=np.float64)
+        columns = {name: values * share for name, values in columns.items()}
     gone = flight.status != "ok"
     return {name: np.where(gone, np.inf, values) for name, values in columns.items()}
 

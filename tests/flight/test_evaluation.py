@@ -219,7 +219,7 @@ REFUSED = [
     (["evaluation.dispersions.offset_x_m=[normal, 0, 1]"], "must be one of offset_u_m, offset_v_m"),
     (
         ["evaluation.dispersions.eccentricity=[normal, 0, 0.01]"],
-        "[normal, 0, 0.01]: draws -0.06, but eccentricity must lie in [0, 1); bound it: [normal, 0, 0.01, lowest, highest]",
+        "draws -0.06, but eccentricity must lie in [0, 1); bound it: [normal, 0, 0.01, lowest, highest]",
     ),
     (["evaluation.dispersions.eccentricity=[uniform, 0, 1]"], "draws 1.0, but eccentricity must lie in [0, 1)"),
     (["evaluation.dispersions.mass_kg=[normal, 500, 100]"], "draws -100, but mass_kg must be positive"),
