@@ -259,26 +259,28 @@ class FlightEvaluation(Evaluation):
         return rows | dict.fromkeys(COUNTERS, np.zeros(count, dtype=np.int64))
 
     def conclude(self, parts: Iterable[Mapping[str, Array]]) -> Conclusion:
-        """Return what survives of every law, stage by stage; of laws with one flight a stage, all that is measured."""
+        """Return what survives of every law, stage by stage; all of laws with one flight at the last stage."""
         rows = joined(list(parts))
         varied = [name for name in self.design_variables if name != LAW_NUMBER and np.unique(rows[name]).size > 1]
         groups = ["initial_condition", *([LAW] if self.laws else varied)]
         found = conclusion.conclude(rows, groups, self.measured_columns, self.bands_m)
-        return self._beside(rows, found) if self.laws and len(self.flights) == len(self.stages) else found
+        alone = [stage for stage, _ in self.flights].count(self.stages[-1]) == 1
+        return self._beside(rows, found) if self.laws and alone else found
 
     def _beside(self, rows: Mapping[str, Array], found: Conclusion) -> Conclusion:
         last = self.stages[-1]
         laws = {beside.LAWS: beside.measured(rows, self.measured_columns, last)}
-        paths = list(beside.paths(rows, last, self.horizon, partial(self._path, last)))
+        paths = list(beside.paths(rows, last, partial(self._path, last)))
         tables = {**found.tables, **laws, **({beside.PATHS: paths} if paths else {})}
         return replace(found, tables=tables, shown=laws | dict(found.shown if len(self.stages) > 1 else {}))
 
-    def _path(self, stage: Stage, design: Mapping[str, float], start: str, times: Floats) -> dict[str, Floats]:
+    def _path(self, stage: Stage, design: Mapping[str, float], start: str) -> dict[str, Floats]:
         if stage == "ideal":
-            return self.sampled(self.solve(design, start), times)
+            times = np.linspace(0.0, self.horizon, self.trajectory_samples)
+            return {"time": times} | self.sampled(self.solve(design, start), times)
         number = next(sample for other, sample in self.flights if other == stage)
         flight: Any = replace(self.fly(start, stage, [number], design), batched=False)
-        return self.sampled(flight, np.minimum(times, flight.horizon))
+        return {"time": flight.switching_times} | self.sampled(flight, flight.switching_times)
 
 
 @dataclass(frozen=True)

@@ -117,3 +117,43 @@ def test_one_component_has_no_approach(tmp_path: Path) -> None:
     results = Results(RunDirectory(execute(compose(words)).run_directory))
     with pytest.raises(FigureError, match="three components in the frame rtn"):
         approach.build(results, select(results, {}))
+
+
+@pytest.fixture(scope="module")
+def flown(tmp_path_factory: pytest.TempPathFactory) -> Results:
+    """One dispersed flight of each law, number 117, beside several noisy ones: thrusters pulse every 10 s."""
+    words = ["experiment=flight_ic1", "horizon_periods=1.2", "evaluation.samples=1", "evaluation.first_sample=117"]
+    words += ["evaluation.noise_samples=2", "evaluation.stages=[noisy,dispersed]", "initial_condition=[ic1]"]
+    words += ["~evaluation.laws.lqr", "~evaluation.laws.pd", "~evaluation.laws.pd_lag", "evaluation.band_m=100"]
+    where = tmp_path_factory.mktemp("flown")
+    words += ["figures=[]", "scheduler=serial", f"output_dir={where}"]
+    return Results(RunDirectory(execute(compose(words)).run_directory))
+
+
+def test_what_a_flight_spends_and_its_peak_are_those_of_the_measures(flown: Results) -> None:
+    figure, table = acceleration.build(flown, select(flown, {}))
+    rows = flown.evaluations[flown.evaluations["stage"] == "dispersed"].set_index("law")
+    assert len(rows) == 3
+    for law, own in table.groupby("kind"):
+        peaks = [own[f"acceleration_{name}_mm_s2"].abs().max() for name in "uvw"]
+        assert max(peaks) == pytest.approx(rows["peak_acceleration_mm_s2"][law], rel=1e-12)
+        assert own["delta_v_m_s"].iloc[-1] == pytest.approx(rows["delta_v_m_s"][law], rel=1e-9)
+    assert {line.get_drawstyle() for line in figure.axes[0].lines[:3]} == {"steps-post"}
+
+
+def test_paths_of_one_flight_by_its_number_are_drawn(flown: Results) -> None:
+    for module in (approach, position_error):
+        _, table = module.build(flown, select(flown, {}))
+        assert set(table["kind"]) == {"published_pd", "published_pd_alpha", "pd_alpha"}
+    start = flown.evaluations.query("stage == 'dispersed'").iloc[0]
+    distance = float(table["distance_m"].iloc[0])
+    offsets = np.array([start[f"offset_{name}_percent"] for name in "uvw"]) * 100.0
+    assert distance == pytest.approx(float(np.hypot(np.hypot(offsets[0] - 1e4, offsets[1]), offsets[2])), rel=1e-9)
+
+
+def test_several_flights_have_no_path_and_the_sentence_says_the_cure(tmp_path: Path) -> None:
+    words = ["experiment=flight_ic1", "horizon_periods=0.1", "evaluation.samples=2", "evaluation.stages=[dispersed]"]
+    words += ["initial_condition=[ic1]", "evaluation.band_m=100", "figures=[]", f"output_dir={tmp_path}"]
+    results = Results(RunDirectory(execute(compose([*words, "scheduler=serial"])).run_directory))
+    with pytest.raises(FigureError, match=r"take evaluation.samples=1 evaluation.first_sample=NUMBER"):
+        position_error.build(results, select(results, {}))
