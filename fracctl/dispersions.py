@@ -124,6 +124,17 @@ def quantile_interval(count: int, share: float) -> tuple[int | None, int | None]
     return (low - 1 if low >= 1 else None), (high - 1 if high <= count else None)
 
 
+def share_interval(count: int, of: int) -> tuple[float, float]:
+    """Return the least and the largest chance of what happened `count` times `of` so many, with 95 % confidence.
+
+    The interval of Clopper and Pearson.
+    """
+    from scipy.stats import binomtest  # takes half a second, in every worker
+
+    found = binomtest(count, of).proportion_ci(CONFIDENCE, method="exact")
+    return float(found.low), float(found.high)
+
+
 def spread(samples: Array, values: Floats) -> dict[str, float]:
     """Return quantiles of values, those of the ends with their intervals, and the extremes with their samples.
 

@@ -185,7 +185,30 @@ def test_what_survives(evaluation: FlightEvaluation, rows: dict[str, np.ndarray]
     assert record["quantile_95_orbits"] == times.max()
     assert record["worst_sample"] == np.argmax(times)
     assert record["settled_percent"] == 100.0 * np.isfinite(times).mean()
+    assert record["settled_percent_low"] == pytest.approx(100.0 * 0.025 ** (1.0 / 3.0)), "3 of 3, Clopper and Pearson"
+    assert record["settled_percent_high"] == 100.0
     assert any(note.startswith("ic1 to 100 m, fastest ideal: ") for note in found.notes)
+
+
+def test_the_worst_of_those_that_never_settle_is_held_worst(
+    evaluation: FlightEvaluation, rows: dict[str, np.ndarray]
+) -> None:
+    own = of(rows, "published_pd", "dispersed")
+    times, held = np.array([np.inf, 0.4, np.inf]), np.array([7.0, 90.0, 5.0])
+    changed = own | {"settling_time_100_m_orbits": times, "hold_error_m": held}
+    (record,) = evaluation.conclude([changed]).tables["survival"]
+    assert record["worst_sample"] == 0
+    assert record["settled_percent"] == pytest.approx(100.0 / 3.0)
+    (record,) = evaluation.conclude([changed | {"hold_error_m": held[::-1]}]).tables["survival"]
+    assert record["worst_sample"] == 2
+
+
+def test_what_is_told_of_laws_that_never_settle(evaluation: FlightEvaluation, rows: dict[str, np.ndarray]) -> None:
+    there = rows["initial_condition"] == "ic1"
+    never = {name: values[there] for name, values in rows.items()}
+    never["settling_time_100_m_orbits"] = np.full(there.sum(), np.inf)
+    (note,) = evaluation.conclude([never]).notes
+    assert note == "ic1 to 100 m, no law settles ideal; no law settles dispersed in 95 % of 3 flights"
 
 
 def test_the_table_is_that_of_any_number_of_workers(tmp_path: Path) -> None:
