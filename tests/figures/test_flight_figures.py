@@ -44,8 +44,10 @@ def test_v_bar_is_to_the_right_and_r_bar_down(results: Results) -> None:
     assert np.asarray(across.lines[0].get_ydata())[100] < 0.0
     assert "V-bar" in plane.get_xlabel()
     assert "(km)" in plane.get_xlabel()
-    (box,) = plane.patches
-    assert box.get_width() == pytest.approx(0.6), "±300 m"
+    (near,) = plane.child_axes
+    (box,) = near.patches
+    assert box.get_width() == pytest.approx(0.2), "±100 m, by which the run is judged, in a panel of its own"
+    assert near.get_xlim() == pytest.approx((-0.3, 0.3))
     assert any("ticks: 10 min" in text.get_text() for text in plane.texts)
 
 
@@ -61,6 +63,28 @@ def test_ticks_lie_on_the_path_at_whole_minutes(results: Results) -> None:
         found = float(np.asarray(mark.get_xdata())[0]), float(np.asarray(mark.get_ydata())[0])
         assert found == pytest.approx(expected, abs=5e-3)
     assert len(marks) >= 5
+
+
+def test_the_approach_is_drawn_until_it_has_settled(results: Results) -> None:
+    figure, _ = approach.build(results, select(results, {}))
+    across = figure.axes[1]
+    best = results.optima[results.optima["kind"] == "overall"].iloc[0]
+    assert across.get_xlim()[1] > float(best["settling_time_100_m_orbits"])
+    levels = [float(np.asarray(line.get_ydata())[0]) for line in across.lines if line.get_linestyle() == ":"]
+    assert levels == pytest.approx([-0.1, 0.1])
+
+
+def test_a_large_hold_box_is_drawn_in_its_place(run: RunDirectory, tmp_path: Path) -> None:
+    content = run.run_json
+    content["configuration"]["evaluation"] = {"type": "flight", "band_m": {"ic1": 1000}}
+    for name in ("optima.parquet", "trajectories.parquet"):
+        (tmp_path / name).symlink_to(run.path / name)
+    (tmp_path / "run.json").write_text(json.dumps(content))
+    results = Results(RunDirectory(tmp_path))
+    plane = approach.build(results, select(results, {}))[0].axes[0]
+    (box,) = plane.patches
+    assert box.get_width() == pytest.approx(2.0)
+    assert not plane.child_axes
 
 
 def test_distance_is_in_metres_with_all_bands(results: Results) -> None:
