@@ -20,16 +20,17 @@ _MOST = 6
 def build(results: Results, selection: Selection) -> tuple[Figure, pd.DataFrame]:
     """Draw the share of samples up to each value, a panel for each measure and a curve for each law and start.
 
-    The option `shows` names measures, separated by commas; the first six that vary without it. Samples without a
+    The option `shows` names measures, separated by commas; the first six that vary without it, of which times in orbits
+    stand for the same in other units. Flights are those of one stage, the option `stage` or the last. Samples without a
     finite value are missing at the top of a curve.
 
     Raises:
-        FigureError: the run is not dispersed, or has no such measure.
+        FigureError: the run is not dispersed, or has no such measure or stage.
     """
-    rows = results.evaluations
-    if "sample" not in rows:
+    if "sample" not in results.evaluations:
         raise FigureError("the run is not dispersed")
-    measures = _measures(results, selection)
+    rows = _of_stage(results.evaluations, selection)
+    measures = _measures(results, rows, selection)
     groups = ["initial_condition", *(["law"] if "law" in rows else [])]
     own = rows[rows["initial_condition"].isin(selection.initial_conditions)]
     lines = -(-len(measures) // _ABREAST)
@@ -46,12 +47,24 @@ def build(results: Results, selection: Selection) -> tuple[Figure, pd.DataFrame]
     for ax in axes[::width]:
         ax.set_ylabel("Share of samples")
     handles, names = axes[0].get_legend_handles_labels()
+    if "stage" in own:
+        figure.suptitle(f"flights {own['stage'].iloc[0]}", fontsize=8.5)
     figure.legend(handles, names, loc="outside lower center", ncols=min(len(names), 4))
     return figure, own[["sample", *groups, *measures]].reset_index(drop=True)
 
 
-def _measures(results: Results, selection: Selection) -> list[str]:
-    rows = results.evaluations
+def _of_stage(rows: pd.DataFrame, selection: Selection) -> pd.DataFrame:
+    """Return the rows of one stage, all where there are none."""
+    if "stage" not in rows:
+        return rows
+    stages = list(dict.fromkeys(rows["stage"]))
+    stage = selection.stage or stages[-1]
+    if stage not in stages:
+        raise FigureError(f"the run has no flights {stage}; it has {', '.join(stages)}{suggestion(stage, stages)}")
+    return rows[rows["stage"] == stage]
+
+
+def _measures(results: Results, rows: pd.DataFrame, selection: Selection) -> list[str]:
     if selection.shows:
         wanted = [name.strip() for name in selection.shows.split(",")]
         if missing := [name for name in wanted if name not in rows]:
@@ -62,6 +75,7 @@ def _measures(results: Results, selection: Selection) -> list[str]:
     after = list(rows.columns).index("sample") + 1
     numbers = rows.columns[after:]
     drawn = set(results.configuration["evaluation"].get("dispersions", {})) | {"error_estimate", "nodes"}
+    drawn |= {again for name in numbers if f"{name}_orbits" in numbers for again in (name, f"{name}_min")}
     varying = [n for n in numbers if n not in drawn and rows[n].dtype == float and rows[n].nunique() > 2]
     if not varying:
         raise FigureError("no measure of the run varies")
