@@ -11,7 +11,7 @@ import numpy as np
 from fracctl.arrays import Array, Booleans, Floats
 from fracctl.dispersions import SAMPLE, share_interval, spread, spreads
 from fracctl.evaluation import Conclusion
-from fracctl.flight.names import STAGES
+from fracctl.flight.stage_names import STAGES
 from fracctl.measures.settling_times import column_of
 
 QUANTILES, SURVIVAL = "quantiles", "survival"

@@ -27,7 +27,7 @@ def names() -> list[str]:
     return [kind.name for kind in _MEASURED]
 
 
-def measured(measure: Any, flight: SampledTrajectory, mass_kg: Floats | None = None) -> Columns:
+def columns_of(measure: Any, flight: SampledTrajectory, mass_kg: Floats | None = None) -> Columns:
     """Return the columns of a measure for a batch of flights, (b,) each; +inf for those that diverged.
 
     Args:

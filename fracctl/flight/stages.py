@@ -12,7 +12,7 @@ from fracctl.arrays import Floats
 from fracctl.dispersions import Distribution, check_names, draws
 from fracctl.errors import ArgumentError
 from fracctl.flight import uncertain
-from fracctl.flight.names import CERTAIN, Stage
+from fracctl.flight.stage_names import CERTAIN, Stage
 from fracctl.loop import ClosedLoop
 from fracctl.plants.linear import LinearPlant
 from fracctl.plants.state import StatePlant

@@ -15,7 +15,7 @@ LAWS, PATHS = "laws", "paths"
 Record = dict[str, Any]
 
 
-def measured(rows: Mapping[str, Array], columns: Sequence[str], stage: str) -> list[Record]:
+def records(rows: Mapping[str, Array], columns: Sequence[str], stage: str) -> list[Record]:
     """Return a record for each start and law: the columns, and the status, of its flight at a stage."""
     names = ("initial_condition", "law", "stage", *columns, "status")
     values = zip(*(rows[name][rows["stage"] == stage].tolist() for name in names), strict=True)
