@@ -40,6 +40,14 @@ def test_a_row_is_the_quantile_of_its_starts() -> None:
         assert rows["objective"][place] == rows["settling_time_100_m"][place]
 
 
+def test_a_search_does_not_choose_whom_to_leave_out() -> None:
+    """Designs for flights count by all of their starts."""
+    evaluation = built([])
+    assert evaluation.quantile == 1.0
+    worst = max(evaluation._each({name: values[:1] for name, values in DESIGN.items()})["settling_time_100_m"])
+    assert evaluation(DESIGN)["settling_time_100_m"][0] == pytest.approx(worst, rel=1e-12)
+
+
 def test_the_largest_is_the_quantile_of_all() -> None:
     most, nearly = built(["evaluation.quantile=1"])(DESIGN), built(["evaluation.quantile=0.5"])(DESIGN)
     assert (most["settling_time_100_m"] > nearly["settling_time_100_m"]).all()
