@@ -17,16 +17,20 @@ SAMPLE = "sample"
 CONFIDENCE = 0.95
 """Of the intervals of quantiles."""
 QUANTILES = (0.05, 0.5, 0.95)
-_COUNTS = {"normal": 2, "uniform": 2, "choice": None}
+_COUNTS: Mapping[str, tuple[int, ...] | None] = {"normal": (2, 4), "uniform": (2,), "choice": None}
+_REACH = 6.0
+"""Deviations within which normal numbers count as lying; one of 5e8 does not."""
 
 
 @dataclass(frozen=True)
 class Distribution:
     """``[normal, mean, deviation]``, ``[uniform, lowest, highest]`` or ``[choice, value, value, …]``.
 
+    ``[normal, mean, deviation, lowest, highest]`` is the normal distribution of what lies in between.
+
     Raises:
-        ArgumentError: the word is unknown, the numbers are not as many or not finite, a deviation is negative, or the
-            lowest is above the highest.
+        ArgumentError: the word is unknown, the numbers are not as many or not finite, a deviation is negative, the
+            lowest is above the highest, or the mean outside of both.
     """
 
     kind: str
@@ -37,13 +41,16 @@ class Distribution:
             hint = suggestion(self.kind, _COUNTS)
             raise ArgumentError("distribution", self.kind, f"must be one of {', '.join(_COUNTS)}{hint}")
         wanted, given = _COUNTS[self.kind], list(self.numbers)
-        if len(given) != (wanted or max(1, len(given))) or not all(map(math.isfinite, given)):
-            many = "numbers" if wanted is None else f"{wanted} numbers"
+        if len(given) not in (wanted or (max(1, len(given)),)) or not all(map(math.isfinite, given)):
+            many = "numbers" if wanted is None else f"{' or '.join(map(str, wanted))} numbers"
             raise ArgumentError("distribution", [self.kind, *given], f"must hold '{self.kind}' and {many}")
         if self.kind == "normal" and given[1] < 0.0:
             raise ArgumentError("distribution", [self.kind, *given], "must have a deviation of at least 0")
         if self.kind == "uniform" and given[0] > given[1]:
             raise ArgumentError("distribution", [self.kind, *given], "must have its lowest value first")
+        if len(self._bounds) == 2 and not self._bounds[0] <= given[0] <= self._bounds[1]:
+            allowed = "must have its mean between the lowest and the highest value"
+            raise ArgumentError("distribution", [self.kind, *given], allowed)
 
     @classmethod
     def of(cls, given: Sequence[Any]) -> Distribution:
@@ -55,10 +62,35 @@ class Distribution:
     def draw(self, random: np.random.Generator) -> float:
         """Return one number."""
         if self.kind == "normal":
-            return float(random.normal(self.numbers[0], self.numbers[1]))
+            return self._truncated(random) if self._bounds else float(random.normal(self.numbers[0], self.numbers[1]))
         if self.kind == "uniform":
             return float(random.uniform(self.numbers[0], self.numbers[1]))
         return float(random.choice(np.array(self.numbers)))
+
+    def __str__(self) -> str:
+        return f"[{', '.join([self.kind, *(f'{number:g}' for number in self.numbers)])}]"
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Lowest and highest number that is drawn; of a normal distribution 6 deviations from the mean."""
+        if self.kind == "normal":
+            mean, deviation = self.numbers[:2]
+            low, high = self._bounds or (-math.inf, math.inf)
+            return max(low, mean - _REACH * deviation), min(high, mean + _REACH * deviation)
+        return min(self.numbers), max(self.numbers)
+
+    @property
+    def _bounds(self) -> tuple[float, ...]:
+        return self.numbers[2:] if self.kind == "normal" else ()
+
+    def _truncated(self, random: np.random.Generator) -> float:
+        from scipy.special import ndtr, ndtri
+
+        mean, deviation, low, high = self.numbers
+        if deviation == 0.0:
+            return mean
+        first, last = ndtr((low - mean) / deviation), ndtr((high - mean) / deviation)
+        return float(np.clip(mean + deviation * ndtri(random.uniform(first, last)), low, high))
 
 
 def check_names(dispersions: Mapping[str, Distribution], known: Collection[str]) -> None:
@@ -93,6 +125,17 @@ def quantile_interval(count: int, share: float) -> tuple[int | None, int | None]
     low = int(binom.ppf(0.5 * (1.0 - CONFIDENCE), count, share))
     high = int(binom.ppf(0.5 * (1.0 + CONFIDENCE), count, share)) + 1
     return (low - 1 if low >= 1 else None), (high - 1 if high <= count else None)
+
+
+def share_interval(count: int, of: int) -> tuple[float, float]:
+    """Return the least and the largest chance of what happened `count` times `of` so many, with 95 % confidence.
+
+    The interval of Clopper and Pearson.
+    """
+    from scipy.stats import binomtest  # takes half a second, in every worker
+
+    found = binomtest(count, of).proportion_ci(CONFIDENCE, method="exact")
+    return float(found.low), float(found.high)
 
 
 def spread(samples: Array, values: Floats) -> dict[str, float]:

@@ -74,10 +74,12 @@ def test_no_spread_is_the_mean() -> None:
     ("given", "said"),
     [
         (["norml", 0, 1], "must be one of normal, uniform, choice; did you mean 'normal'?"),
-        (["normal", 0], "must hold 'normal' and 2 numbers"),
+        (["normal", 0], "must hold 'normal' and 2 or 4 numbers"),
+        (["normal", 0, 1, 2], "must hold 'normal' and 2 or 4 numbers"),
+        (["normal", 0, 1, 1, 2], "must have its mean between the lowest and the highest value"),
         (["uniform", 0, 1, 2], "must hold 'uniform' and 2 numbers"),
         (["choice"], "must hold 'choice' and numbers"),
-        (["normal", math.nan, 1], "must hold 'normal' and 2 numbers"),
+        (["normal", math.nan, 1], "must hold 'normal' and 2 or 4 numbers"),
         (["uniform", 0, math.inf], "must hold 'uniform' and 2 numbers"),
         (["normal", 0, -1], "must have a deviation of at least 0"),
         (["uniform", 2, 1], "must have its lowest value first"),
@@ -161,3 +163,19 @@ def test_groups_are_kept_apart() -> None:
     first, second = spreads(rows, ["law"], ["time"])
     assert (first["law"], first["measure"], first["samples"], first["largest"]) == ("one", "time", 2, 2.0)
     assert (second["law"], second["smallest"], second["largest"]) == ("two", 10.0, 20.0)
+
+
+@pytest.mark.parametrize(("mean", "low", "high"), [(0.0, 0.0, 0.05), (0.3, 0.29, 0.4), (1.0, -9.0, 1.01)])
+def test_normal_numbers_between_bounds(mean: float, low: float, high: float) -> None:
+    found = draws({"e": Distribution.of(["normal", mean, 0.02, low, high])}, 0, range(COUNT))["e"]
+    expected = stats.truncnorm((low - mean) / 0.02, (high - mean) / 0.02, mean, 0.02)
+    assert stats.kstest(found, expected.cdf).pvalue > 0.01
+    assert low <= found.min()
+    assert found.max() <= high
+
+
+def test_what_a_distribution_reaches() -> None:
+    assert Distribution.of(["normal", 1.0, 0.1]).ends == pytest.approx((0.4, 1.6))
+    assert Distribution.of(["normal", 1.0, 0.1, 0.9, 5.0]).ends == pytest.approx((0.9, 1.6))
+    assert Distribution.of(["uniform", -2.0, 3.0]).ends == (-2.0, 3.0)
+    assert Distribution.of(["choice", 4, -1, 2]).ends == (-1.0, 4.0)

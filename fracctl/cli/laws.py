@@ -57,30 +57,39 @@ def quantile_lines(records: Sequence[Record]) -> list[str]:
 def survival_lines(records: Sequence[Record]) -> list[str]:
     """Return a part for each start: a row for each law, the settling time of each stage, then what the last one shows.
 
-    Of stages with several flights stand the median and, in brackets, what 95 % of them keep.
+    Of stages with several flights stand the median and, in brackets, what 95 % of them keep; of the last one the
+    intervals of this quantile and of the share that settles, too.
     """
     lines = []
     for condition in dict.fromkeys(record["initial_condition"] for record in records):
         own = [record for record in records if record["initial_condition"] == condition]
         stages = list(dict.fromkeys(record["stage"] for record in own))
         title = f"{condition}, orbits to {own[0]['band_m']:g} m"
-        further = [name for name in _TAKEN if name in own[0]]
+        last = [record for record in own if record["stage"] == stages[-1]]
+        several = any(record["samples"] > 1 for record in last)
+        further = [name for name in _TAKEN if name in own[0] and (several or name not in _OF_SEVERAL)]
         head = [title, *stages, *(_TAKEN[name] for name in further)]
         rows = []
         for law in dict.fromkeys(_who(record) for record in own):
             of_law = {record["stage"]: record for record in own if _who(record) == law}
             cells = [_settled(of_law[stage]) if stage in of_law else "" for stage in stages]
-            rows.append([law, *cells, *(_number(of_law[stages[-1]].get(name)) for name in further)])
+            rows.append([law, *cells, *(_taken(name, of_law[stages[-1]]) for name in further)])
         lines += table([head, *rows])
     return lines
 
 
 _TAKEN = {
+    "quantile_95_orbits": "interval of 95 %",
     "settled_percent": "% settled",
+    "worst_sample": "worst sample",
+    "limited_percent": "% limited",
     "median_delta_v_m_s": "ΔV, m/s",
+    "median_station_keeping_mm_s_per_orbit": "last orbit, mm/s",
     "median_hold_error_m": "held, m",
 }
 """What is told of the last stage besides, by the columns of the table."""
+_OF_SEVERAL = ("quantile_95_orbits", "worst_sample")
+"""Of these what needs several flights."""
 
 
 def _who(record: Record) -> str:
@@ -88,6 +97,17 @@ def _who(record: Record) -> str:
     names = list(record)
     design = [name for name in names[: names.index("stage")] if name != "initial_condition"]
     return ", ".join(str(record[n]) if n == "law" else f"{n} = {_number(record[n])}" for n in design) or "the law"
+
+
+def _taken(name: str, record: Record) -> str:
+    """A number, with its interval where it has one."""
+    if name == "quantile_95_orbits":
+        low, high = (record[f"quantile_95_{end}_orbits"] for end in ("low", "high"))
+        return f"[{'-∞' if low is None else f'{low:.3f}'}, {'∞' if high is None else f'{high:.3f}'}]"
+    if name == "settled_percent" and record["samples"] > 1:
+        low, high = (record[f"settled_percent_{end}"] for end in ("low", "high"))
+        return f"{number(record[name], 3)} [{number(low, 3)}, {number(high, 3)}]"
+    return _number(record.get(name))
 
 
 def _settled(record: Record) -> str:

@@ -72,16 +72,17 @@ def build_evaluation(config: RunConfig) -> Evaluation:
         return _delayed(given, common)
     common["loop_measures"] = tuple(measure for measure in made if isinstance(measure, LoopMeasure))
     common["constraints"] = {column: limit(text) for column, text in config.constraints.items()}
-    return _robust(given, config.seed, common) if isinstance(given, RobustOptions) else Evaluation(**common)
+    return _robust(config, given, common) if isinstance(given, RobustOptions) else Evaluation(**common)
 
 
-def _robust(given: RobustOptions, seed: int, common: Mapping[str, Any]) -> Evaluation:
+def _robust(config: RunConfig, given: RobustOptions, common: Mapping[str, Any]) -> Evaluation:
     from fracctl.flight import RobustEvaluation
 
     dispersions = flight.distributions(given)
-    options = given.model_dump(exclude={"type", "dispersions"})
+    options = given.model_dump(exclude={"type", "dispersions"}) | {"seed": config.seed}
+    sizes = flight.start_sizes(config, common["plant"])
     try:
-        return RobustEvaluation(**common, dispersions=dispersions, seed=seed, **options)
+        return RobustEvaluation(**common, dispersions=dispersions, sizes=sizes, **options)
     except ArgumentError as error:
         raise _refused(error) from error
 
@@ -125,7 +126,7 @@ def _flight(config: RunConfig, given: FlightOptions, common: Mapping[str, Any]) 
     try:
         sampling = Sampling(**{field.name: getattr(given, field.name) for field in fields(Sampling)})
         around = flight.surroundings(config, given, plant)
-        free = {**common, "objectives": {}, "objective": ""}
+        free = {**common, "objectives": {}, "objective": "", "sizes": flight.start_sizes(config, plant)}
         return FlightEvaluation(**free, laws=laws, sampling=sampling, surroundings=around, seed=config.seed, **options)
     except ArgumentError as error:
         raise _refused(error) from error
@@ -283,10 +284,5 @@ def build_initial_conditions(config: RunConfig, plant: LinearPlant) -> dict[str,
 
 
 def _state(given: Mapping[str, Any], plant: LinearPlant) -> Floats:
-    if given["units"] == "elements":
-        return flight.state_of_differences(given, plant)
-    state = np.array([given[name] for name in plant.state_names], dtype=np.float64)
-    if given["units"] == "si" and plant.scales is not None:
-        m = len(plant.components)
-        state /= np.repeat([plant.scales.length_m, plant.scales.speed_m_s], m)
-    return state
+    whole = flight.whole_state(given, plant)
+    return np.array([whole[name] for name in plant.state_names])

@@ -18,12 +18,13 @@ from fracctl.config.evaluations import (
     RobustEvaluation,
 )
 from fracctl.config.options import construct
-from fracctl.config.parts import DIFFERENCES
+from fracctl.config.parts import DIFFERENCES, state_keys
 from fracctl.config.schemas import HORIZONS, RunConfig
 from fracctl.controllers import Saturation
 from fracctl.dispersions import Distribution
 from fracctl.elements import linearised_map, relative_state
 from fracctl.errors import ArgumentError, ConfigurationError
+from fracctl.flight.uncertain import Size, size_of
 from fracctl.plants import Chief
 from fracctl.units import Scales, Spacecraft
 
@@ -155,19 +156,33 @@ def in_units(name: str, measure: Any, plant: Any, craft: Spacecraft) -> Any:
         raise ConfigurationError(f"measures.{name}: {error.name} {error.allowed}") from error
 
 
+def start_sizes(config: RunConfig, plant: Any) -> dict[str, Size]:
+    """Return distance and speed of every start as it is configured, whatever the plant takes of it."""
+    starts = {name: whole_state(options.model_dump(), plant) for name, options in config.initial_condition.items()}
+    return {name: size_of(np.array(list(whole.values()))) for name, whole in starts.items()}
+
+
+def whole_state(given: Mapping[str, Any], plant: Any) -> dict[str, float]:
+    """Return the dimensionless state of a start by name, in all three components for a part of HCW."""
+    names = state_keys(plant)
+    if given["units"] == "elements":
+        return dict(zip(names, state_of_differences(given, plant).tolist(), strict=True))
+    state = np.array([given[name] for name in names], dtype=np.float64)
+    if given["units"] == "si" and plant.scales is not None:
+        state /= np.repeat([plant.scales.length_m, plant.scales.speed_m_s], len(names) // 2)
+    return dict(zip(names, state.tolist(), strict=True))
+
+
 def state_of_differences(given: Mapping[str, Any], plant: Any) -> Floats:
-    """Return the dimensionless state that differences of orbit elements from the plant's chief are, (2m,)."""
+    """Return the dimensionless state that differences of orbit elements from the plant's chief are, (6,)."""
     degrees = math.pi / 180.0
     units = [1e3 / plant.scales.length_m, degrees, degrees, 1.0, 1.0, degrees]
     differences = np.array([given[name] for name in DIFFERENCES]) * units
     chief = plant.chief_elements
     if given["linearised"]:
-        state = linearised_map(chief) @ differences
-    else:
-        state = relative_state(chief, differences, getattr(plant, "frame_rate", None))
-    axes = ["uvw".find(name) if name in "uvw" else "xyz".index(name) for name in plant.components]
-    parts: Floats = state[[*axes, *(axis + 3 for axis in axes)]]
-    return parts
+        linear: Floats = linearised_map(chief) @ differences
+        return linear
+    return relative_state(chief, differences, getattr(plant, "frame_rate", None))
 
 
 def _scales(scales: Scales | None, what: str, instead: str) -> Scales:

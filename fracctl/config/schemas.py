@@ -93,6 +93,8 @@ class Figure(Typed):
     initial_conditions: Annotated[list[str], Field(min_length=1)] | None = None
     """Which are shown; None for all."""
     shows: str | None = None
+    stage: str | None = None
+    """Of flights, the stage that is shown; None for the last."""
     """What figures that can show several things show."""
 
 

@@ -27,8 +27,8 @@ def build(results: Results, selection: Selection) -> tuple[Figure, pd.DataFrame]
     """Draw a column for each initial condition: a panel for each axis, and below them the cumulative ΔV.
 
     Dashed lines are the bound of the thrusters, for each axis where it is by axis and of the magnitude otherwise. The
-    ΔV is that of thrusters along the axes, Σ_i ∫ |υ_i| ds, by the trapezoidal rule on the stored samples; the measure
-    `delta_v` is exact.
+    ΔV is that of thrusters along the axes, Σ_i ∫ |υ_i| ds, by the trapezoidal rule on the stored samples, where the
+    measure `delta_v` is exact; of flights it is exact too, for their controls are steps.
 
     Raises:
         FigureError: the run holds no trajectory of an optimum.
@@ -62,7 +62,7 @@ def _axis(ax: Axes, curves: Sequence[Curve], component: str, results: Results) -
     unit = 1.0 if results.scales is None else 1e3 * results.scales.acceleration_m_s2
     for curve in curves:
         values = unit * curve.samples[f"control_{component}"].to_numpy(float)
-        ax.plot(curve.times / math.tau, values, **line(curve))
+        ax.plot(curve.times / math.tau, values, drawstyle="steps-post" if curve.held else "default", **line(curve))
     ax.axhline(0.0, color=GREY, linewidth=0.5, zorder=0)
     bound = largest_acceleration(results)
     for level in () if bound is None else (-unit * bound, unit * bound):
@@ -79,7 +79,8 @@ def _spent_so_far(ax: Axes, curves: Sequence[Curve], results: Results) -> None:
 def spent(curve: Curve) -> Floats:
     """Return Σ_i ∫ |υ_i| ds up to each sample, dimensionless."""
     rate = np.sum([np.abs(curve.samples[f"control_{name}"].to_numpy(float)) for name in curve.components], axis=0)
-    steps = 0.5 * (rate[1:] + rate[:-1]) * np.diff(curve.times)
+    mean = rate[:-1] if curve.held else 0.5 * (rate[1:] + rate[:-1])
+    steps = mean * np.diff(curve.times)
     return np.concatenate([[0.0], np.cumsum(steps)])
 
 

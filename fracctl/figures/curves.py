@@ -28,6 +28,8 @@ class Curve:
     """Names of the positions."""
     place: int | None = None
     """Of the law among several, whose name is `kind` then."""
+    held: bool = False
+    """Whether controls are constant from each sample to the next."""
 
     @property
     def times(self) -> Floats:
@@ -42,6 +44,8 @@ class Curve:
     def values(self, column: str, times: Floats) -> Floats:
         """A state or a control at any times; positions by cubic Hermite interpolation with their rates."""
         samples = self.samples[column].to_numpy(float)
+        if self.held and column.startswith("control_"):
+            return samples[np.searchsorted(self.times, times, side="right") - 1]
         if f"{column}_dot" not in self.samples:
             return np.asarray(np.interp(times, self.times, samples))
         rates = self.samples[f"{column}_dot"].to_numpy(float)
@@ -78,8 +82,15 @@ def curves_of(results: Results, selection: Selection, initial_condition: str) ->
         if not samples.empty:
             curves.append(Curve(kind, best, samples, results.components))
     if not curves:
-        raise FigureError(f"no trajectory of an optimum of {selection.objective} is stored for '{initial_condition}'")
+        raise FigureError(_missing(results, selection, initial_condition))
     return curves
+
+
+def _missing(results: Results, selection: Selection, initial_condition: str) -> str:
+    if results.configuration["evaluation"]["type"] == "flight":
+        cure = "evaluation.samples=1 evaluation.first_sample=NUMBER, or evaluation.noise_samples=1 where it ends before"
+        return f"paths are kept of several laws with one flight at the last stage; take {cure}"
+    return f"no trajectory of an optimum of {selection.objective} is stored for '{initial_condition}'"
 
 
 def _of_laws(results: Results, initial_condition: str) -> list[Curve]:
@@ -89,9 +100,8 @@ def _of_laws(results: Results, initial_condition: str) -> list[Curve]:
         own, row = (t[(t["law"] == law) & (t["initial_condition"] == initial_condition)] for t in (paths, rows))
         if not own.empty:
             best = {str(name): value for name, value in row.iloc[0].items()}
-            curves.append(
-                Curve(law, best, own.drop(columns=["initial_condition", "law", "stage"]), results.components, place)
-            )
+            samples, held = own.drop(columns=["initial_condition", "law", "stage"]), own["stage"].iloc[0] != "ideal"
+            curves.append(Curve(law, best, samples, results.components, place, held))
     if not curves:
         raise FigureError(f"no law has flown from '{initial_condition}'")
     return curves

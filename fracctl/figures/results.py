@@ -35,7 +35,7 @@ _DESIGN = (
     "adapt",
 )
 """What columns of design variables begin with."""
-_OPTIONS = ("objective", "initial_conditions", "shows")
+_OPTIONS = ("objective", "initial_conditions", "shows", "stage")
 _IN_ORBIT = ("tether", "libration", "relative_motion", "tschauner_hempel", "perturbed_relative_motion")
 """Plants whose time 2π is an orbit."""
 
@@ -172,6 +172,8 @@ class Selection:
     """Names, in the order of the rows of the figure."""
     shows: str | None = None
     """What figures that can show several things show; None for what they show by themselves."""
+    stage: str | None = None
+    """Of flights, the stage that is shown; None for the last."""
 
     @property
     def value_column(self) -> str:
@@ -195,7 +197,7 @@ def showing(words: Iterable[str] | None) -> Callable[[_Builder], _Builder]:
 
 
 def select(results: Results, options: Mapping[str, Any]) -> Selection:
-    """Read the options `objective` (default: the primary one), `initial_conditions` (default: all) and `shows`.
+    """Read the options `objective` (default: the primary), `initial_conditions` (default: all), `shows` and `stage`.
 
     Raises:
         ConfigurationError: an option or a name is unknown.
@@ -209,7 +211,7 @@ def select(results: Results, options: Mapping[str, Any]) -> Selection:
     present = list(results.configuration["initial_condition"])
     asked = options.get("initial_conditions") or present
     _known("initial condition", asked, present)
-    return Selection(objective, tuple(objectives[objective]), tuple(asked), options.get("shows"))
+    return Selection(objective, tuple(objectives[objective]), tuple(asked), options.get("shows"), options.get("stage"))
 
 
 def optimum(results: Results, selection: Selection, initial_condition: str, kind: str) -> Row | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pandas as pd
@@ -23,18 +24,20 @@ _MOST = 6
 def build(results: Results, selection: Selection) -> tuple[Figure, pd.DataFrame]:
     """Draw the share of samples up to each value, a panel for each measure and a curve for each law and start.
 
-    The option `shows` names measures, separated by commas; the first six that vary without it. Samples without a
+    The option `shows` names measures, separated by commas; the first six that vary without it, of which times in orbits
+    stand for the same in other units. Flights are those of one stage, the option `stage` or the last. Samples without a
     finite value are missing at the top of a curve.
 
     Raises:
-        FigureError: the run is not dispersed, or has no such measure.
+        FigureError: the run is not dispersed, or has no such measure or stage.
     """
     if "sample" not in results.columns:
         raise FigureError("the run is not dispersed")
-    measures = _measures(results, selection)
+    wanted = {"initial_condition": selection.initial_conditions, **_stage(results, selection)}
+    measures = _measures(results, wanted, selection)
     groups = ["initial_condition", *(["law"] if "law" in results.columns else [])]
-    wanted = {"initial_condition": selection.initial_conditions}
-    own = results.run.evaluations_where(wanted, list(dict.fromkeys(["sample", *groups, *measures])))
+    held = ["sample", *groups, *(name for name in wanted if name not in groups), *measures]
+    own = results.run.evaluations_where(wanted, list(dict.fromkeys(held)))
     lines = -(-len(measures) // _ABREAST)
     width = min(_ABREAST, len(measures))
     figure = Figure(figsize=(FULL_WIDTH_IN, _PANEL_HEIGHT_IN * lines + 0.3), layout="constrained")
@@ -49,27 +52,41 @@ def build(results: Results, selection: Selection) -> tuple[Figure, pd.DataFrame]
     for ax in axes[::width]:
         ax.set_ylabel("Share of samples")
     handles, names = axes[0].get_legend_handles_labels()
+    if "stage" in own:
+        figure.suptitle(f"flights {own['stage'].iloc[0]}", fontsize=8.5)
     figure.legend(handles, names, loc="outside lower center", ncols=min(len(names), 4))
     return figure, own
 
 
-def _measures(results: Results, selection: Selection) -> list[str]:
+def _stage(results: Results, selection: Selection) -> dict[str, tuple[str]]:
+    """Return the one stage whose flights are shown, nothing where there are none."""
+    if "stage" not in results.columns:
+        return {}
+    stages = list(dict.fromkeys(results.run.evaluations(["stage"])["stage"]))
+    stage = selection.stage or stages[-1]
+    if stage not in stages:
+        raise FigureError(f"the run has no flights {stage}; it has {', '.join(stages)}{suggestion(stage, stages)}")
+    return {"stage": (stage,)}
+
+
+def _measures(results: Results, wanted: Mapping[str, Sequence[str]], selection: Selection) -> list[str]:
     if selection.shows:
-        wanted = [name.strip() for name in selection.shows.split(",")]
-        if missing := [name for name in wanted if name not in results.columns]:
+        shown = [name.strip() for name in selection.shows.split(",")]
+        if missing := [name for name in shown if name not in results.columns]:
             raise FigureError(f"the run does not measure {', '.join(missing)}{suggestion(missing[0], results.columns)}")
-        return wanted
+        return shown
     after = results.columns[results.columns.index("sample") + 1 :]
     drawn = set(results.configuration["evaluation"].get("dispersions", {})) | {"error_estimate", "nodes"}
-    varying = (name for name in after if name not in drawn and _varies(results, name))
+    drawn |= {again for name in after if f"{name}_orbits" in after for again in (name, f"{name}_min")}
+    varying = (name for name in after if name not in drawn and _varies(results, wanted, name))
     found = list(itertools.islice(varying, _MOST))
     if not found:
         raise FigureError("no measure of the run varies")
     return found
 
 
-def _varies(results: Results, name: str) -> bool:
-    values = results.run.evaluations([name])[name]
+def _varies(results: Results, wanted: Mapping[str, Sequence[str]], name: str) -> bool:
+    values = results.run.evaluations_where(wanted, [*wanted, name])[name]
     return values.dtype == float and values.nunique() > 2
 
 

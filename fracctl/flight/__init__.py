@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from fracctl.flight.names import STAGES, Stage
+from fracctl.flight.stage_names import STAGES, Stage
 from fracctl.lazy import loaded_at_first_use
 
 if TYPE_CHECKING:

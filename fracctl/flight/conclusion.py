@@ -8,15 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from fracctl.arrays import Array
-from fracctl.dispersions import SAMPLE, spread, spreads
+from fracctl.arrays import Array, Booleans, Floats
+from fracctl.dispersions import SAMPLE, share_interval, spread, spreads
 from fracctl.evaluation import Conclusion
-from fracctl.flight.names import STAGES
+from fracctl.flight.stage_names import STAGES
 from fracctl.measures.settling_times import column_of
 
 QUANTILES, SURVIVAL = "quantiles", "survival"
 """Names of the tables."""
-_DELTA_V, _HOLD = "delta_v_m_s", "hold_error_m"
+_DELTA_V, _STATION_KEEPING, _HOLD = "delta_v_m_s", "station_keeping_mm_s_per_orbit", "hold_error_m"
 Record = dict[str, Any]
 
 
@@ -46,15 +46,28 @@ def survival(rows: Mapping[str, Array], groups: Sequence[str], bands_m: Mapping[
         band = bands_m[str(key[0])]
         samples, times = rows[SAMPLE][places], np.asarray(rows[settling_column(band)], dtype=np.float64)[places]
         found = spread(samples, times)
-        record |= {"band_m": band, "samples": len(places), "settled_percent": 100.0 * float(np.isfinite(times).mean())}
+        record |= {"band_m": band, "samples": len(places)} | _settled(np.isfinite(times))
         record |= {"median_orbits": found["median"], "quantile_95_orbits": found["quantile_95"]}
         record |= {f"quantile_95_{end}_orbits": found[f"quantile_95_{end}"] for end in ("low", "high")}
-        record |= {"worst_sample": found["largest_sample"]}
-        for measure in (_DELTA_V, _HOLD):
+        record |= {"worst_sample": _worst(rows, places, times)}
+        for measure in (_DELTA_V, _STATION_KEEPING, _HOLD):
             if measure in rows:
                 of_all = spread(samples, np.asarray(rows[measure], dtype=np.float64)[places])
                 record |= {f"{word}_{measure}": of_all[word] for word in ("median", "quantile_95")}
         yield record | {"limited_percent": float(rows["limited_percent"][places].mean())}
+
+
+def _settled(inside: Booleans) -> Record:
+    """Return the share of flights that settle, with its interval."""
+    low, high = share_interval(int(inside.sum()), len(inside))
+    shares = {"": float(inside.mean()), "_low": low, "_high": high}
+    return {f"settled_percent{end}": 100.0 * share for end, share in shares.items()}
+
+
+def _worst(rows: Mapping[str, Array], places: Array, times: Floats) -> float:
+    """Return the sample that settles last; of those that never do the one that is held worst."""
+    held = np.asarray(rows[_HOLD], dtype=np.float64)[places] if _HOLD in rows else np.zeros(len(places))
+    return float(rows[SAMPLE][places][np.lexsort((held, times))[-1]])
 
 
 def settling_column(band_m: float) -> str:
@@ -72,10 +85,10 @@ def _sentences(records: Sequence[Record], groups: Sequence[str], condition: str)
     for stage, column in ((stages[0], "median_orbits"), (stages[-1], "quantile_95_orbits")):
         there = [record for record in own if record["stage"] == stage]
         best = min(there, key=lambda record: record[column])
+        share = f" in 95 % of {best['samples']} flights" if best["samples"] > 1 else ""
         if math.isinf(best[column]):
-            words.append(f"no law settles in 95 % of {best['samples']} flights {stage}")
+            words.append(f"no law settles {stage}{share}")
         else:
-            share = f" in 95 % of {best['samples']} flights" if best["samples"] > 1 else ""
             words.append(f"fastest {stage}: {_name(best, groups)} ({best[column]:.3f} orbits{share})")
     yield f"{condition} to {own[0]['band_m']:g} m, {'; '.join(words)}"
 

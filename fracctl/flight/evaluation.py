@@ -13,9 +13,10 @@ from fracctl.arrays import Array, Floats, joined
 from fracctl.dispersions import SAMPLE
 from fracctl.errors import ArgumentError, UnsupportedError, suggestion
 from fracctl.evaluation import COUNTERS, LAW_NUMBER, Conclusion, Evaluation
-from fracctl.flight import beside, conclusion
-from fracctl.flight.measured import measured, names, takes
-from fracctl.flight.names import CERTAIN, STAGES, Stage
+from fracctl.flight import conclusion, single_flights, uncertain
+from fracctl.flight import rows as rows_of
+from fracctl.flight.measured import names, takes
+from fracctl.flight.stage_names import CERTAIN, STAGES, Stage
 from fracctl.flight.stages import Flown, Sampling, Surroundings
 from fracctl.loop import ClosedLoop
 from fracctl.memory_evaluation import LAW, NamedLaw, check_laws
@@ -23,8 +24,6 @@ from fracctl.sampled import DiscreteController, SampledTrajectory, simulate
 from fracctl.stability import assess
 
 FLIGHT, STAGE = "flight", "stage"
-LIMITED = "limited_percent"
-"""Column of the share of periods in which the thrusters were at their limit."""
 _ABREAST = 256
 """Flights of a batch: their states are kept at all samples."""
 _NOISE = int.from_bytes(b"noise")
@@ -59,6 +58,8 @@ class FlightEvaluation(Evaluation):
     first_sample: int = 0
     """Number of the first; any sample can be flown again by its number."""
     seed: int = 0
+    sizes: Mapping[str, uncertain.Size] = field(default_factory=dict)
+    """What per cents of offsets are of, by initial condition; those of the states where none are given."""
 
     @property
     def has_poles(self) -> bool:
@@ -126,7 +127,7 @@ class FlightEvaluation(Evaluation):
         """Columns of the rows, in order."""
         named = (LAW,) if self.laws else ()
         where = (STAGE, FLIGHT, SAMPLE, *self.around.dispersions)
-        tail = (LIMITED, "status", "stable", "error_estimate", *COUNTERS)
+        tail = (rows_of.LIMITED, "status", "stable", "error_estimate", *COUNTERS)
         return ("initial_condition", *named, *self.design_variables, *where, *self.measured_columns, *tail)
 
     def loop(self, design: Mapping[str, Floats | float]) -> ClosedLoop:
@@ -139,13 +140,13 @@ class FlightEvaluation(Evaluation):
     def __call__(self, design: Mapping[str, Floats]) -> dict[str, Array]:
         """Return the rows of b design points: all points of the first initial condition, then of the next."""
         points = self._points({name: np.asarray(values, dtype=np.float64) for name, values in design.items()})
-        uncertain = {n: np.where(points.stages == "dispersed", v, np.nan) for n, v in points.drawn.items()}
+        drawn = {n: np.where(points.stages == "dispersed", v, np.nan) for n, v in points.drawn.items()}
         own: dict[str, Array] = {
             **points.designs,
             STAGE: points.stages,
             FLIGHT: points.numbers,
             SAMPLE: points.samples,
-        } | uncertain
+        } | drawn
         if self.laws:
             own[LAW] = np.array(list(self.laws), dtype=object)[points.designs[LAW_NUMBER].astype(int)]
         tables = []
@@ -169,23 +170,29 @@ class FlightEvaluation(Evaluation):
         """Yield the measures of the flights of one law from one start that stand at `places`, part by part."""
         loop = self.loop({name: float(values[places[0]]) for name, values in points.designs.items()})
         if assess(loop).stable is False:
-            yield places, self._not_flown(len(places), "unstable")
+            yield places, rows_of.of_none(len(places), self.measured_columns, "unstable")
             return
         try:
             controller = self.sampling.law(loop).discrete(self.plant.n_controls)
         except UnsupportedError:
-            yield places, self._not_flown(len(places), "failed")
+            yield places, rows_of.of_none(len(places), self.measured_columns, "failed")
             return
+        band = self.bands_m[condition]
         for stage in dict.fromkeys(points.stages[places].tolist()):
             inside = places[points.stages[places] == stage]
             for first in range(0, len(inside), _ABREAST):
                 at = inside[first : first + _ABREAST]
                 if stage == "ideal":
-                    yield at, self._ideal(loop, condition)
+                    found = self.solver.solve(loop, self.initial_conditions[condition][None], self.horizon)
+                    yield at, rows_of.of_ideal(found, self.measures, band)
                 else:
                     drawn = {name: values[at] for name, values in points.drawn.items()}
-                    met = self.around.of(stage, self.initial_conditions[condition], drawn, len(at))
-                    yield at, self._measured(self._flown(controller, met, points.samples[at]), condition)
+                    met = self._met(condition, stage, drawn, len(at))
+                    flight = self._flown(controller, met, points.samples[at])
+                    yield at, rows_of.of_sampled(flight, met, self.measures, band)
+
+    def _met(self, condition: str, stage: Stage, drawn: Mapping[str, Floats], count: int) -> Flown:
+        return self.around.of(stage, self.initial_conditions[condition], drawn, count, self.sizes.get(condition))
 
     def _flown(self, controller: DiscreteController, met: Flown, samples: Floats) -> SampledTrajectory:
         return simulate(
@@ -219,63 +226,32 @@ class FlightEvaluation(Evaluation):
             raise ArgumentError("stage", stage, f"must be one of {', '.join(STAGES[1:])}")
         numbers = np.array(list(samples), dtype=np.float64)
         controller = self.sampling.law(self.loop(design or {})).discrete(self.plant.n_controls)
-        nominal = self.initial_conditions[initial_condition]
-        return self._flown(
-            controller, self.around.of(stage, nominal, self.around.drawn(numbers), len(numbers)), numbers
-        )
-
-    def _ideal(self, loop: ClosedLoop, condition: str) -> dict[str, Array]:
-        found = self.solver.solve(loop, self.initial_conditions[condition][None], self.horizon)
-        rows: dict[str, Array] = {}
-        for measure in self.measures:
-            rows |= measure(found)
-        status = self._told(found.status.copy(), rows, condition)
-        rows |= {LIMITED: np.zeros(1), "status": status, "stable": found.stable}
-        return rows | {"error_estimate": found.error_estimate} | {name: found.counters[name] for name in COUNTERS}
-
-    def _measured(self, flight: SampledTrajectory, condition: str) -> dict[str, Array]:
-        rows: dict[str, Array] = {}
-        for measure in self.measures:
-            rows |= measured(measure, flight)
-        b, periods = flight.commands.shape[:2]
-        rows |= {LIMITED: 100.0 * flight.saturated_share, "status": self._told(flight.status.copy(), rows, condition)}
-        rows |= {"stable": np.full(b, None, dtype=object), "error_estimate": np.full(b, np.nan)}
-        return rows | dict.fromkeys(COUNTERS, np.full(b, periods))
-
-    def _told(self, status: Array, rows: Mapping[str, Array], condition: str) -> Array:
-        status[(status == "ok") & ~np.isfinite(rows[conclusion.settling_column(self.bands_m[condition])])] = "unsettled"
-        return status
-
-    def _not_flown(self, count: int, word: str) -> dict[str, Array]:
-        rows: dict[str, Array] = {name: np.full(count, np.inf) for name in self.measured_columns}
-        rows |= {LIMITED: np.full(count, np.nan), "status": np.full(count, word, dtype=object)}
-        rows |= {
-            "stable": np.full(count, False if word == "unstable" else None, dtype=object),
-            "error_estimate": np.full(count, np.nan),
-        }
-        return rows | dict.fromkeys(COUNTERS, np.zeros(count, dtype=np.int64))
+        met = self._met(initial_condition, stage, self.around.drawn(numbers), len(numbers))
+        return self._flown(controller, met, numbers)
 
     def conclude(self, parts: Iterable[Mapping[str, Array]]) -> Conclusion:
-        """Return what survives of every law, stage by stage; of laws with one flight a stage, all that is measured."""
+        """Return what survives of every law, stage by stage; all of laws with one flight at the last stage."""
         rows = joined(list(parts))
         varied = [name for name in self.design_variables if name != LAW_NUMBER and np.unique(rows[name]).size > 1]
         groups = ["initial_condition", *([LAW] if self.laws else varied)]
         found = conclusion.conclude(rows, groups, self.measured_columns, self.bands_m)
-        return self._beside(rows, found) if self.laws and len(self.flights) == len(self.stages) else found
+        alone = [stage for stage, _ in self.flights].count(self.stages[-1]) == 1
+        return self._with_paths(rows, found) if self.laws and alone else found
 
-    def _beside(self, rows: Mapping[str, Array], found: Conclusion) -> Conclusion:
+    def _with_paths(self, rows: Mapping[str, Array], found: Conclusion) -> Conclusion:
         last = self.stages[-1]
-        laws = {beside.LAWS: beside.measured(rows, self.measured_columns, last)}
-        paths = list(beside.paths(rows, last, self.horizon, partial(self._path, last)))
-        tables = {**found.tables, **laws, **({beside.PATHS: paths} if paths else {})}
+        laws = {single_flights.LAWS: single_flights.records(rows, self.measured_columns, last)}
+        paths = list(single_flights.paths(rows, last, partial(self._path, last)))
+        tables = {**found.tables, **laws, **({single_flights.PATHS: paths} if paths else {})}
         return replace(found, tables=tables, shown=laws | dict(found.shown if len(self.stages) > 1 else {}))
 
-    def _path(self, stage: Stage, design: Mapping[str, float], start: str, times: Floats) -> dict[str, Floats]:
+    def _path(self, stage: Stage, design: Mapping[str, float], start: str) -> dict[str, Floats]:
         if stage == "ideal":
-            return self.sampled(self.solve(design, start), times)
+            times = np.linspace(0.0, self.horizon, self.trajectory_samples)
+            return {"time": times} | self.sampled(self.solve(design, start), times)
         number = next(sample for other, sample in self.flights if other == stage)
         flight: Any = replace(self.fly(start, stage, [number], design), batched=False)
-        return self.sampled(flight, np.minimum(times, flight.horizon))
+        return {"time": flight.switching_times} | self.sampled(flight, flight.switching_times)
 
 
 @dataclass(frozen=True)

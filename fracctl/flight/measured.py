@@ -27,9 +27,18 @@ def names() -> list[str]:
     return [kind.name for kind in _MEASURED]
 
 
-def measured(measure: Any, flight: SampledTrajectory) -> Columns:
-    """Return the columns of a measure for a batch of flights, (b,) each; +inf for those that diverged."""
+def columns_of(measure: Any, flight: SampledTrajectory, mass_kg: Floats | None = None) -> Columns:
+    """Return the columns of a measure for a batch of flights, (b,) each; +inf for those that diverged.
+
+    Args:
+        measure: of a kind in `names`.
+        flight: all of them.
+        mass_kg: of every flight, (b,); None for that of the measure's spacecraft.
+    """
     columns = _MEASURED[type(measure)](measure, flight)
+    if mass_kg is not None and isinstance(measure, PeakForce | Propellant):  # both are in proportion to it
+        share = mass_kg / np.asarray(measure.spacecraft.mass_kg, dtype=np.float64)
+        columns = {name: values * share for name, values in columns.items()}
     gone = flight.status != "ok"
     return {name: np.where(gone, np.inf, values) for name, values in columns.items()}
 

@@ -33,6 +33,8 @@ class RobustEvaluation(Evaluation):
 
     dispersions: Mapping[str, Distribution] = field(default_factory=dict, kw_only=True)
     """Of starts, by the names of `fracctl.flight.uncertain.offset_names`."""
+    sizes: Mapping[str, uncertain.Size] = field(default_factory=dict, kw_only=True)
+    """What per cents are of, by initial condition; those of the states where none are given."""
     samples: int = field(default=50, kw_only=True)
     first_sample: int = field(default=0, kw_only=True)
     """Number of the first."""
@@ -54,7 +56,7 @@ class RobustEvaluation(Evaluation):
         states = {
             f"{name} {number}": state
             for name, nominal in self.initial_conditions.items()
-            for number, state in enumerate(uncertain.starts(self.plant, nominal, drawn))
+            for number, state in enumerate(uncertain.starts(self.plant, nominal, drawn, self.sizes.get(name)))
         }
         return Evaluation(
             self.plant,

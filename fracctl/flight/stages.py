@@ -13,7 +13,7 @@ from fracctl.arrays import Floats
 from fracctl.dispersions import Distribution, check_names, draws
 from fracctl.errors import ArgumentError
 from fracctl.flight import uncertain
-from fracctl.flight.names import CERTAIN, Stage
+from fracctl.flight.stage_names import CERTAIN, Stage
 from fracctl.loop import ClosedLoop
 from fracctl.plants.linear import LinearPlant
 from fracctl.plants.state import StatePlant
@@ -85,8 +85,8 @@ class Surroundings:
     """What flights meet beyond the design: thrusters, navigation, true motion, and what is uncertain of all this.
 
     Raises:
-        ArgumentError: a dispersion has an unknown name, or is of a mass that is not given; the true plant is another
-            kind of motion than that of the design.
+        ArgumentError: a dispersion has an unknown name, draws what cannot be, or is of a mass that is not given; the
+            true plant is another kind of motion than that of the design.
     """
 
     plant: LinearPlant
@@ -105,8 +105,25 @@ class Surroundings:
             allowed = f"must have {self.plant.n_states} states as the plant of the design, but has"
             raise ArgumentError("truth", self.truth, f"{allowed} {self.truth.n_states}; take plant=hcw")
         check_names(self.dispersions, self.known)
+        for name, distribution in self.dispersions.items():
+            self._check_ends(name, distribution)
         if uncertain.MASS in self.dispersions and self.spacecraft.mass_kg is None:
             raise ArgumentError("dispersions", uncertain.MASS, "needs spacecraft.mass_kg, which the law is made for")
+
+    def _check_ends(self, name: str, distribution: Distribution) -> None:
+        """One impossible number would end a run of hundreds of flights."""
+        try:
+            if name in self._of_truth:
+                truth: Any = self.truth
+                truth.dispersed_by(**{name: np.array(distribution.ends)})
+            else:
+                uncertain.check(name, distribution.ends[0])
+        except ArgumentError as error:
+            allowed, cure = f"draws {error.value}, but {name} {error.allowed}", None
+            if distribution.kind == "normal":
+                mean, deviation = distribution.numbers[:2]
+                cure = f"bound it: [normal, {mean:g}, {deviation:g}, lowest, highest]"
+            raise ArgumentError(f"dispersions.{name}", str(distribution), allowed, cure) from error
 
     @property
     def known(self) -> list[str]:
@@ -122,24 +139,42 @@ class Surroundings:
         """Return the uncertain numbers of samples (b,), (b,) each."""
         return draws(self.dispersions, self.seed, [int(sample) for sample in samples])
 
-    def of(self, stage: Stage, nominal: Floats, drawn: Mapping[str, Floats], count: int) -> Flown:
-        """Return what `count` flights of a stage from a nominal state (n,) meet; only the last stage is uncertain."""
+    def of(
+        self,
+        stage: Stage,
+        nominal: Floats,
+        drawn: Mapping[str, Floats],
+        count: int,
+        size: uncertain.Size | None = None,
+    ) -> Flown:
+        """Return what `count` flights of a stage from a nominal state (n,) meet; only the last stage is uncertain.
+
+        Args:
+            stage: which.
+            nominal: x(0), dimensionless.
+            drawn: what is uncertain, (b,) each.
+            count: b.
+            size: what per cents of offsets are of, as `fracctl.flight.uncertain.starts` takes it.
+        """
         states = np.repeat(nominal[None], count, axis=0)
         if stage in CERTAIN:
             return Flown(self.plant, states)
         truth = self.plant if stage == "noisy" or self.truth is None else self.truth
         met = Flown(truth, states, self.actuator, self.navigation)
-        return self._dispersed(met, nominal, drawn) if stage == "dispersed" and drawn else met
+        if stage != "dispersed" or not drawn:
+            return met
+        return self._dispersed(met, uncertain.starts(self.plant, nominal, drawn, size), drawn)
 
-    def _dispersed(self, met: Flown, nominal: Floats, drawn: Mapping[str, Floats]) -> Flown:
+    def _dispersed(self, met: Flown, states: Floats, drawn: Mapping[str, Floats]) -> Flown:
         plant: Any = met.plant
         own = {name: values for name, values in drawn.items() if name in self._of_truth}
         factor = uncertain.efficiency(self.spacecraft.mass_kg, drawn)
         return Flown(
             plant.dispersed_by(**own) if own else plant,
-            uncertain.starts(self.plant, nominal, drawn),
+            states,
             replace(self.actuator, efficiency=factor),
             self._navigation(drawn),
+            drawn.get(uncertain.MASS),
         )
 
     def _navigation(self, drawn: Mapping[str, Floats]) -> Navigation:
@@ -152,7 +187,7 @@ class Surroundings:
         }
         for name, unit in zip(uncertain.NOISES, (scales.length_m, scales.speed_m_s), strict=True):
             if name in drawn:
-                changed[name.rsplit("_m", 1)[0]] = np.abs(drawn[name])[:, None] / unit
+                changed[name.rsplit("_m", 1)[0]] = drawn[name][:, None] / unit
         return replace(self.navigation, **changed)
 
 
@@ -165,3 +200,5 @@ class Flown:
     """At time 0, (b, n)."""
     actuator: Actuator | None = None
     navigation: Navigation | None = None
+    mass_kg: Floats | None = None
+    """Of every flight, (b,); None for that of the spacecraft."""

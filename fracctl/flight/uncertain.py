@@ -8,7 +8,10 @@ from typing import Any
 import numpy as np
 
 from fracctl.arrays import Floats
+from fracctl.errors import ArgumentError
 
+Size = tuple[float, float]
+"""Distance and speed of a start, dimensionless."""
 MASS, THRUST = "mass_kg", "thrust_factor"
 NOISES = ("position_noise_m", "velocity_noise_m_s")
 _OFFSET, _PERCENT = "offset_", "_percent"
@@ -27,18 +30,32 @@ def bias_names(plant: Any) -> list[str]:
     return [f"{what}_bias_{c}{unit}" for what, unit in (("position", "_m"), ("velocity", "_m_s")) for c in _axes(plant)]
 
 
-def starts(plant: Any, nominal: Floats, drawn: Mapping[str, Floats]) -> Floats:
-    """Return the states (b, n) of b flights that begin about a nominal one (n,).
+def check(name: str, lowest: float) -> None:
+    """Raise ArgumentError unless a mass, a thrust factor or a noise can be as low as this."""
+    if name in (MASS, THRUST) and lowest <= 0.0:
+        raise ArgumentError(name, f"{lowest:g}", "must be positive")
+    if name in NOISES and lowest < 0.0:
+        raise ArgumentError(name, f"{lowest:g}", "must not be negative")
 
-    Per cents are of |ξ(0)| for positions, of |ξ'(0)| for velocities.
+
+def size_of(state: Floats) -> Size:
+    """Return |ξ(0)| and |ξ'(0)| of a start (2m,)."""
+    positions, rates = np.split(state, 2)
+    return float(np.linalg.norm(positions)), float(np.linalg.norm(rates))
+
+
+def starts(plant: Any, nominal: Floats, drawn: Mapping[str, Floats], size: Size | None = None) -> Floats:
+    """Return the states (b, n) of b flights that begin about a nominal one (n,).
 
     Args:
         plant: with states [ξ, ξ'] and scales.
         nominal: x(0), dimensionless.
         drawn: numbers by the names of `offset_names`, (b,) each; others play no part.
+        size: what per cents are of: distance and speed of the start in all its components, of which the plant may take
+            but a part; those of `nominal` without.
     """
     m, scales = plant.n_controls, plant.scales
-    sizes = np.repeat([np.linalg.norm(nominal[:m]), np.linalg.norm(nominal[m:])], m)
+    sizes = np.repeat(size or size_of(nominal), m)
     units = np.repeat([1.0 / scales.length_m, 1.0 / scales.speed_m_s], m)
     states = np.repeat(nominal[None], len(next(iter(drawn.values()))), axis=0)
     names = offset_names(plant)

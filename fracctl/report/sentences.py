@@ -111,10 +111,10 @@ def _survival(records: Sequence[Record]) -> Iterator[str]:
         ordered = sorted(last, key=lambda record: _infinite(record["quantile_95_orbits"]))
         head = f"From {condition} to {number(own[0]['band_m'])} m, flown {own[-1]['stage']}: "
         best = ordered[0]
-        if best["quantile_95_orbits"] is None:
-            yield head + f"no law settles in 95 % of {count(best['samples'], 'flight')}."
-            continue
         share = f" in 95 % of {best['samples']} flights" if best["samples"] > 1 else ""
+        if best["quantile_95_orbits"] is None:
+            yield f"{head}no law settles{share}."
+            continue
         lost = [_law(record) for record in ordered if record["quantile_95_orbits"] is None]
         rest = f"; {', '.join(lost)} {'does' if len(lost) == 1 else 'do'} not" if lost else ""
         yield head + f"{_law(best)} is fastest, {_orbits(best['quantile_95_orbits'])}{share}{rest}."

@@ -40,6 +40,12 @@ class SampledTrajectory:
         return np.asarray(self.period * np.arange(self.at_samples.shape[1]), dtype=np.float64)
 
     @property
+    def switching_times(self) -> Floats:
+        """0, all (k + delay) T_s at which a command begins to act, and the horizon; controls are constant between."""
+        begins = (np.arange(self.commands.shape[1]) + self.delay) * self.period
+        return np.unique(np.concatenate([[0.0], begins[begins < self.horizon], [self.horizon]]))
+
+    @property
     def horizon(self) -> float:
         """K T_s."""
         return self.period * float(self.at_samples.shape[1] - 1)

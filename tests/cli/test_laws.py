@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from fracctl.cli.laws import law_lines, quantile_lines
+from fracctl.cli.laws import law_lines, quantile_lines, survival_lines
 
 
 def law(name: str, settling: float | None, condition: str = "release") -> dict[str, Any]:
@@ -63,3 +63,39 @@ def test_a_part_for_each_group_with_the_values_of_its_parameters() -> None:
         name: value for name, value in quantiles("tension_max").items() if name not in ("initial_condition", "law")
     }
     assert quantile_lines([one])[0].startswith("  release, alpha_1 = 0.5")
+
+
+def survivor(stage: str, samples: int, **further: Any) -> dict[str, Any]:
+    record = {"initial_condition": "ic1", "law": "pd", "stage": stage, "band_m": 100.0, "samples": samples}
+    record |= {"settled_percent": 100.0, "settled_percent_low": 99.265, "settled_percent_high": 100.0}
+    record |= {"median_orbits": 0.46, "quantile_95_orbits": 0.812}
+    record |= {"quantile_95_low_orbits": 0.79, "quantile_95_high_orbits": None, "worst_sample": 117.0}
+    return record | {"limited_percent": 1.25, "median_delta_v_m_s": 54.0} | further
+
+
+def test_survival_with_intervals_and_the_worst_sample() -> None:
+    head, row = survival_lines([survivor("ideal", 1), survivor("dispersed", 500)])
+    for heading in ("ic1, orbits to 100 m", "ideal", "dispersed", "interval of 95 %", "% settled", "worst sample"):
+        assert heading in head
+    assert row.split() == [
+        "pd",
+        "0.460",
+        "0.460",
+        "(0.812)",
+        "[0.790,",
+        "∞]",
+        "100",
+        "[99.3,",
+        "100]",
+        "117",
+        "1.25",
+        "54",
+    ]
+    assert row.index("[0.790") == head.index("interval")
+
+
+def test_a_single_flight_has_no_interval() -> None:
+    head, row = survival_lines([survivor("ideal", 1), survivor("noisy", 1)])
+    assert "interval" not in head
+    assert "worst" not in head
+    assert row.split() == ["pd", "0.460", "0.460", "100", "1.25", "54"]

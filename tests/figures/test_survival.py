@@ -7,7 +7,7 @@ import pytest
 
 from fracctl.config.compose import compose
 from fracctl.execution.run import execute
-from fracctl.figures import FigureError, survival
+from fracctl.figures import FigureError, spread, survival
 from fracctl.figures.results import Results, select
 from fracctl.store import RunDirectory
 from tests.flight.test_evaluation import SMALL
@@ -41,6 +41,25 @@ def test_what_never_settles_lies_on_the_upper_line(results: Results) -> None:
     heights = np.concatenate([np.asarray(line.get_ydata()) for line in hollow])
     assert len(heights) == never.sum()
     assert (heights > longest).all()
+
+
+def test_a_spread_is_that_of_one_stage(results: Results) -> None:
+    """Of the last, as long as no other is named; times once, not in all their units."""
+    figure, table = spread.build(results, select(results, {"initial_conditions": ["ic1"]}))
+    assert len(table) == 3 * 4, "samples and laws"
+    times = [name for name in table if name.startswith("settling_time")]
+    assert times
+    assert all(name.endswith("_orbits") for name in times)
+    rows = results.evaluations
+    there = (rows["stage"] == "dispersed") & (rows["initial_condition"] == "ic1")
+    assert sorted(table["settling_time_1000_m_orbits"]) == sorted(rows[there]["settling_time_1000_m_orbits"])
+    assert figure.get_suptitle() == "flights dispersed"
+    given = {"initial_conditions": ["ic1"], "stage": "noisy", "shows": "delta_v_m_s"}
+    _, noisy = spread.build(results, select(results, given))
+    there = (rows["stage"] == "noisy") & (rows["initial_condition"] == "ic1")
+    assert sorted(noisy["delta_v_m_s"]) == sorted(rows[there]["delta_v_m_s"])
+    with pytest.raises(FigureError, match=r"has no flights noisi; it has .*did you mean 'noisy'"):
+        spread.build(results, select(results, {"stage": "noisi"}))
 
 
 def test_other_runs_have_no_flights(tmp_path_factory: pytest.TempPathFactory) -> None:

@@ -185,7 +185,30 @@ def test_what_survives(evaluation: FlightEvaluation, rows: dict[str, np.ndarray]
     assert record["quantile_95_orbits"] == times.max()
     assert record["worst_sample"] == np.argmax(times)
     assert record["settled_percent"] == 100.0 * np.isfinite(times).mean()
+    assert record["settled_percent_low"] == pytest.approx(100.0 * 0.025 ** (1.0 / 3.0)), "3 of 3, Clopper and Pearson"
+    assert record["settled_percent_high"] == 100.0
     assert any(note.startswith("ic1 to 100 m, fastest ideal: ") for note in found.notes)
+
+
+def test_the_worst_of_those_that_never_settle_is_held_worst(
+    evaluation: FlightEvaluation, rows: dict[str, np.ndarray]
+) -> None:
+    own = of(rows, "published_pd", "dispersed")
+    times, held = np.array([np.inf, 0.4, np.inf]), np.array([7.0, 90.0, 5.0])
+    changed = own | {"settling_time_100_m_orbits": times, "hold_error_m": held}
+    (record,) = evaluation.conclude([changed]).tables["survival"]
+    assert record["worst_sample"] == 0
+    assert record["settled_percent"] == pytest.approx(100.0 / 3.0)
+    (record,) = evaluation.conclude([changed | {"hold_error_m": held[::-1]}]).tables["survival"]
+    assert record["worst_sample"] == 2
+
+
+def test_what_is_told_of_laws_that_never_settle(evaluation: FlightEvaluation, rows: dict[str, np.ndarray]) -> None:
+    there = rows["initial_condition"] == "ic1"
+    never = {name: values[there] for name, values in rows.items()}
+    never["settling_time_100_m_orbits"] = np.full(there.sum(), np.inf)
+    (note,) = evaluation.conclude([never]).notes
+    assert note == "ic1 to 100 m, no law settles ideal; no law settles dispersed in 95 % of 3 flights"
 
 
 def test_the_table_is_that_of_any_number_of_workers(tmp_path: Path) -> None:
@@ -221,6 +244,13 @@ REFUSED = [
         ["evaluation.thrusters.impulse_bit_n_s=400"],
         "impulse_bit_n_s = 400: is more than the thrusters give in a period",
     ),
+        ["evaluation.dispersions.eccentricity=[normal, 0, 0.01]"],
+        "draws -0.06, but eccentricity must lie in [0, 1); bound it: [normal, 0, 0.01, lowest, highest]",
+    ),
+    (["evaluation.dispersions.eccentricity=[uniform, 0, 1]"], "draws 1.0, but eccentricity must lie in [0, 1)"),
+    (["evaluation.dispersions.mass_kg=[normal, 500, 100]"], "draws -100, but mass_kg must be positive"),
+    (["evaluation.dispersions.thrust_factor=[choice, 0, 1]"], "draws 0, but thrust_factor must be positive"),
+    (["evaluation.dispersions.position_noise_m=[normal, 1, 1]"], "draws -5, but position_noise_m must not be negative"),
     (["evaluation.memory_samples=20"], "evaluation.memory_samples = 20: goes with memory = window"),
     (
         ["evaluation.memory=window", "evaluation.memory_samples=50000"],
@@ -258,3 +288,27 @@ def test_the_truth_has_the_chief_of_the_design(evaluation: FlightEvaluation) -> 
 
 def test_bands_are_those_of_the_measure() -> None:
     assert "settling_time_300_m_orbits" in SettlingTimes([300.0]).columns
+
+
+def test_forces_and_propellant_are_those_of_the_mass_that_flies() -> None:
+    """A light spacecraft is accelerated beyond thrust over nominal mass, but no thruster gives more than it can."""
+    words = ["+measures.peak_force={}", "+measures.propellant={}", "spacecraft.isp_s=220", "evaluation.samples=12"]
+    alone = built([*ONE, *words, "evaluation.stages=[nonlinear,dispersed]", "initial_condition.ic1.u=-0.003"])
+    rows = alone(all_points(alone))
+    found = of(rows, "published_pd", "dispersed")
+    given = 8.0 * found["thrust_factor"]
+    np.testing.assert_allclose(found["peak_force_n"], given, rtol=1e-12, err_msg="all are at their limit")
+    np.testing.assert_allclose(found["peak_force_n"], found["mass_kg"] * found["peak_acceleration_mm_s2"] / 1e3)
+    burnt = found["mass_kg"] * -np.expm1(-found["delta_v_m_s"] / (9.80665 * 220.0))
+    np.testing.assert_allclose(found["propellant_kg"], burnt, rtol=1e-12)
+    certain = of(rows, "published_pd", "nonlinear")
+    np.testing.assert_allclose(certain["peak_force_n"], 8.0, rtol=1e-12)
+
+
+def test_a_bounded_eccentricity_flies() -> None:
+    words = ["evaluation.dispersions.eccentricity=[normal, 0, 0.01, 0, 0.03]", "evaluation.stages=[dispersed]"]
+    alone = built([*ONE, *words, "evaluation.samples=20", "horizon_periods=0.1"])
+    drawn = of(alone(all_points(alone)), "published_pd", "dispersed")["eccentricity"]
+    assert drawn.min() >= 0.0
+    assert drawn.max() <= 0.03
+    assert len(set(drawn.tolist())) == 20
