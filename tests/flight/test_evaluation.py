@@ -244,6 +244,7 @@ REFUSED = [
         ["evaluation.thrusters.impulse_bit_n_s=400"],
         "impulse_bit_n_s = 400: is more than the thrusters give in a period",
     ),
+    (
         ["evaluation.dispersions.eccentricity=[normal, 0, 0.01]"],
         "draws -0.06, but eccentricity must lie in [0, 1); bound it: [normal, 0, 0.01, lowest, highest]",
     ),
