@@ -16,8 +16,9 @@ from fracctl.controllers.saturation import Saturation
 from fracctl.errors import ArgumentError, UnsupportedError
 from fracctl.fractional.system import LinearFractionalSystem
 from fracctl.fractional.terms import FractionalTerm
+from fracctl.plants.capabilities import LimitedPlant, batch_of
 from fracctl.plants.linear import LinearPlant
-from fracctl.plants.state import LimitedPlant, StatePlant, batch_of
+from fracctl.plants.state import StatePlant
 
 
 class Need(StrEnum):

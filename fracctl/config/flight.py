@@ -24,7 +24,7 @@ from fracctl.controllers import Saturation
 from fracctl.dispersions import Distribution
 from fracctl.elements import linearised_map, relative_state
 from fracctl.errors import ArgumentError, ConfigurationError
-from fracctl.plants import Chief
+from fracctl.plants.capabilities import ChiefPlant, TurningPlant
 from fracctl.units import Scales, Spacecraft
 
 if TYPE_CHECKING:
@@ -128,7 +128,7 @@ def distributions(given: FlightEvaluation | MemoryEvaluation | RobustEvaluation)
 
 def _truth(given: FlightEvaluation, plant: Any) -> Any:
     assert given.truth is not None
-    if not isinstance(getattr(plant, "chief", None), Chief):
+    if not isinstance(plant, ChiefPlant):
         cure = "take plant=hcw, or leave truth null"
         raise ConfigurationError(f"evaluation.truth.type = {given.truth.type}: needs a chief on an orbit; {cure}")
     return construct(registry.load("plants", given.truth.type), given.truth, leader=plant.chief)
@@ -157,7 +157,7 @@ def state_of_differences(given: Mapping[str, Any], plant: Any) -> Floats:
     if given["linearised"]:
         state = linearised_map(chief) @ differences
     else:
-        state = relative_state(chief, differences, getattr(plant, "frame_rate", None))
+        state = relative_state(chief, differences, plant.frame_rate if isinstance(plant, TurningPlant) else None)
     axes = ["uvw".find(name) if name in "uvw" else "xyz".index(name) for name in plant.components]
     parts: Floats = state[[*axes, *(axis + 3 for axis in axes)]]
     return parts

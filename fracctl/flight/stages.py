@@ -14,6 +14,7 @@ from fracctl.errors import ArgumentError
 from fracctl.flight import uncertain
 from fracctl.flight.names import CERTAIN, Stage
 from fracctl.loop import ClosedLoop
+from fracctl.plants.capabilities import names_dispersed
 from fracctl.plants.linear import LinearPlant
 from fracctl.plants.state import StatePlant
 from fracctl.sampled import Actuator, Memory, Navigation, SampledLaw, Window, memory_for
@@ -105,7 +106,7 @@ class Surroundings:
 
     @property
     def _of_truth(self) -> tuple[str, ...]:
-        return tuple(getattr(self.truth, "dispersed", ()))
+        return names_dispersed(self.truth)
 
     def drawn(self, samples: Floats) -> dict[str, Floats]:
         """Return the uncertain numbers of samples (b,), (b,) each."""

@@ -12,7 +12,8 @@ from numpy.typing import ArrayLike
 from fracctl.arrays import Array, Floats, batch_size, finite
 from fracctl.compiling import ACCELERATION, compiled_with, pointer_with
 from fracctl.errors import ArgumentError
-from fracctl.plants.state import Event, SecondOrder, of_rows
+from fracctl.plants.capabilities import of_rows
+from fracctl.plants.state import Event, SecondOrder
 from fracctl.units import EARTH_GRAVITATIONAL_PARAMETER_KM3_S2
 
 EARTH_RADIUS_KM = 6378.137

@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike
 
 from fracctl.arrays import Booleans, Floats, finite
 from fracctl.errors import ArgumentError
-from fracctl.plants.state import StatePlant, batch_of
+from fracctl.plants.capabilities import batch_of
+from fracctl.plants.state import StatePlant
 from fracctl.sampled.actuator import Actuator
 from fracctl.sampled.controller import DiscreteController
 from fracctl.sampled.law import SampledLaw

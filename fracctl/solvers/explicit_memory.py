@@ -21,8 +21,9 @@ from fracctl.characteristic.winding import unstable_zeros
 from fracctl.errors import ArgumentError, UnsupportedError
 from fracctl.loop import ClosedLoop, Need
 from fracctl.panels import Panel, PanelGrid
+from fracctl.plants.capabilities import members_of
 from fracctl.plants.linear import LinearPlant
-from fracctl.plants.state import StatePlant, members_of
+from fracctl.plants.state import StatePlant
 from fracctl.solvers.base import Survey
 from fracctl.solvers.explicit_memory_law import highest_used, signals
 from fracctl.solvers.explicit_memory_mesh import step_edges

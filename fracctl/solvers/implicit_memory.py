@@ -15,6 +15,7 @@ from fracctl.errors import ArgumentError, UnsupportedError
 from fracctl.fractional.sum_of_exponentials import sum_of_exponentials
 from fracctl.loop import ClosedLoop
 from fracctl.meshwise import MeshTrajectory
+from fracctl.plants.capabilities import CompiledPlant
 from fracctl.plants.state import Event, StatePlant
 from fracctl.solvers.control_events import ended_by_controls
 from fracctl.solvers.implicit_memory_kernel import BRACKETED, UNRESOLVED, march, room_for
@@ -87,7 +88,7 @@ class ImplicitMemory:
             delayed = loop.controller is None or isinstance(loop.controller, DelayedLaw)
             instead = "method_of_steps" if delayed else "explicit_memory"
             return f"the {self.name} solver does not take {law}; use '{instead}'"
-        if getattr(loop.plant, "acceleration", None) is None:
+        if not isinstance(loop.plant, CompiledPlant):
             return f"the {self.name} solver needs a plant with a compiled acceleration, as Tether has"
         if loop.saturation is not None and loop.saturation.by != "axis":
             return f"the {self.name} solver limits each control by itself; use a saturation by axis"

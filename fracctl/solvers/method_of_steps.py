@@ -12,7 +12,7 @@ from fracctl.controllers.adaptive_delay import AdaptiveDelayedFeedback
 from fracctl.controllers.delayed_feedback import DelayedLaw, DelayedTerm
 from fracctl.errors import ArgumentError, UnsupportedError
 from fracctl.loop import ClosedLoop, Need
-from fracctl.plants.state import members_of
+from fracctl.plants.capabilities import members_of
 from fracctl.solvers.control_events import ended_by_controls
 from fracctl.solvers.members import positive, starting_states, whole
 from fracctl.solvers.method_of_steps_adaptive import AdaptiveRun
