@@ -14,10 +14,7 @@ from fracctl.compiling import ACCELERATION, compiled_with, pointer_with
 from fracctl.errors import ArgumentError
 from fracctl.plants.capabilities import of_rows
 from fracctl.plants.state import Event, SecondOrder
-from fracctl.units import EARTH_GRAVITATIONAL_PARAMETER_KM3_S2
-
-EARTH_RADIUS_KM = 6378.137
-"""Equatorial radius of the Earth, WGS 84."""
+from fracctl.units import EARTH_GRAVITATIONAL_PARAMETER_KM3_S2, EARTH_RADIUS_KM
 
 
 @pointer_with(ACCELERATION)
