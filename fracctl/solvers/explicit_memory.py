@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fracctl.arrays import Array, Booleans, Floats, finite, share
+from fracctl.arrays import Array, Booleans, Floats, finite, positive, share
 from fracctl.characteristic.bounds import pole_radius
 from fracctl.characteristic.matrix import CharacteristicMatrix
 from fracctl.characteristic.winding import unstable_zeros
@@ -28,7 +28,7 @@ from fracctl.solvers.base import Survey
 from fracctl.solvers.explicit_memory_law import highest_used, signals
 from fracctl.solvers.explicit_memory_mesh import step_edges
 from fracctl.solvers.explicit_memory_run import Problem, Run, run
-from fracctl.solvers.members import Members, common_batch, equal_orders, positive, whole
+from fracctl.solvers.members import Members, common_batch, equal_orders, whole
 from fracctl.solvers.results import merged
 from fracctl.trajectory import Trajectory
 

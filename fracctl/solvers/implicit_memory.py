@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fracctl.arrays import Array, Floats
+from fracctl.arrays import Array, Floats, positive
 from fracctl.controllers.delayed_feedback import DelayedLaw
 from fracctl.controllers.memory import MemoryLaw
 from fracctl.errors import ArgumentError, UnsupportedError
@@ -19,7 +19,7 @@ from fracctl.plants.capabilities import CompiledPlant
 from fracctl.plants.state import Event, StatePlant
 from fracctl.solvers.control_events import ended_by_controls
 from fracctl.solvers.implicit_memory_kernel import BRACKETED, UNRESOLVED, march, room_for
-from fracctl.solvers.members import positive, starting_states
+from fracctl.solvers.members import starting_states
 
 _GROWTH = 15.0
 """Share by which the first steps grow, over the largest step: 3 % for 2e-3, so that they are refined as the others."""
