@@ -28,6 +28,14 @@ def finite(name: str, value: ArrayLike) -> Floats:
     return array
 
 
+def positive(name: str, value: ArrayLike) -> float:
+    """Return a positive finite number; raise ArgumentError for others."""
+    number = float(finite(name, value))
+    if number <= 0.0:
+        raise ArgumentError(name, number, "must be positive")
+    return number
+
+
 def share(name: str, value: float) -> float:
     """Return a number in [0, 1]; raise ArgumentError for others."""
     number = float(finite(name, value))

@@ -15,6 +15,7 @@ from fracctl.errors import ArgumentError
 from fracctl.evaluation import COUNTERS, Conclusion, Evaluation, geometric_mean
 from fracctl.loop import ClosedLoop
 from fracctl.measures.largest_multiplier import LargestMultiplier
+from fracctl.plants.capabilities import SectionedPlant, period_of
 from fracctl.plants.state import StatePlant
 from fracctl.stability.windows import windows
 
@@ -56,7 +57,8 @@ class DelayedEvaluation(Evaluation):
         super().__post_init__()
         plant: Any = self.plant
         needed, others = _NEEDED_OF_PLANTS.get(self.delay_from, (None, ""))
-        if needed is not None and getattr(plant, needed, None) is None:
+        lacks = {"period": period_of(plant) is None, "section": not isinstance(plant, SectionedPlant)}
+        if needed is not None and lacks[needed]:
             allowed = f"{type(plant).__name__} has no {needed} of its own"
             raise ArgumentError("evaluation.delay_from", self.delay_from, allowed, f"take {others}")
         for measure in self.measures:

@@ -16,8 +16,9 @@ from fracctl.controllers.saturation import Saturation
 from fracctl.errors import ArgumentError, UnsupportedError
 from fracctl.fractional.system import LinearFractionalSystem
 from fracctl.fractional.terms import FractionalTerm
+from fracctl.plants.capabilities import LimitedPlant, batch_of
 from fracctl.plants.linear import LinearPlant
-from fracctl.plants.state import LimitedPlant, StatePlant, batch_of
+from fracctl.plants.state import StatePlant
 
 
 class Need(StrEnum):
@@ -42,7 +43,8 @@ class ClosedLoop:
             for no limits even so.
 
     Raises:
-        ArgumentError: the shapes of the law's gains do not fit the plant.
+        ArgumentError: a class stands for a plant or a law, or the shapes of the law's gains, its history or the limits
+            do not fit the plant.
         UnsupportedError: the law's gains follow from the matrices of a linear plant, and this one has none.
     """
 
@@ -51,6 +53,11 @@ class ClosedLoop:
     saturation: Saturation | None = None
 
     def __post_init__(self) -> None:
+        parts: dict[str, object] = {"plant": self.plant, "controller": self.controller}
+        for name, given in parts.items():
+            if isinstance(given, type):
+                cure = f"make one of it, {given.__name__}(…)"
+                raise ArgumentError(name, f"the class {given.__name__}", "must be an object", cure)
         if self.saturation is None and self.controller is not None and isinstance(self.plant, LimitedPlant):
             object.__setattr__(self, "saturation", Saturation(self.plant.limits, "axis"))
         elif self.saturation is not None and self.saturation.is_none:
@@ -58,6 +65,17 @@ class ClosedLoop:
         if self.saturation is not None:
             self.saturation.check(self.plant.n_controls)
         self.batch  # noqa: B018 - a wrong shape is refused here, where the user sees which loop it is
+        self._check_history()
+
+    def _check_history(self) -> None:
+        history = self.controller.history if isinstance(self.controller, DelayedLaw) else None
+        if history is not None:
+            shortest = min(float(np.min(term.delay)) for term in self.delayed_terms)
+            past = history(np.full((self.batch or 1, 1), -0.5 * shortest))
+            states = np.atleast_1d(past).shape[-1]
+            if states not in (1, self.plant.n_states):
+                allowed = f"must have one number or the {self.plant.n_states} states of the plant"
+                raise ArgumentError("history", f"of {states}", allowed)
 
     @property
     def needs(self) -> frozenset[Need]:

@@ -15,7 +15,7 @@ from fracctl.errors import ArgumentError, suggestion
 from fracctl.evaluation import COUNTERS, LAW_NUMBER, Conclusion, Evaluation, ParametrisedLaw, geometric_mean
 from fracctl.loop import ClosedLoop
 from fracctl.measures.tethers import targets
-from fracctl.plants.state import control_events
+from fracctl.plants.capabilities import control_events, names_dispersed
 
 if TYPE_CHECKING:
     from fracctl.meshwise import MeshTrajectory
@@ -82,7 +82,7 @@ class MemoryEvaluation(Evaluation):
             super().__post_init__()
         check_laws(self.laws, self.plant.components)
         states = [f"{_INITIAL}{name}" for name in self.plant.state_names]
-        check_names(self.dispersions, [*states, *getattr(self.plant, "dispersed", ())])
+        check_names(self.dispersions, [*states, *names_dispersed(self.plant)])
 
     @property
     def dispersed(self) -> bool:

@@ -25,7 +25,7 @@ from fracctl.dispersions import Distribution
 from fracctl.elements import linearised_map, relative_state
 from fracctl.errors import ArgumentError, ConfigurationError
 from fracctl.flight.uncertain import Size, size_of
-from fracctl.plants import Chief
+from fracctl.plants.capabilities import ChiefPlant, TurningPlant
 from fracctl.units import Scales, Spacecraft
 
 if TYPE_CHECKING:
@@ -136,7 +136,7 @@ def distributions(given: FlightEvaluation | MemoryEvaluation | RobustEvaluation)
 
 def _truth(given: FlightEvaluation, plant: Any) -> Any:
     assert given.truth is not None
-    if not isinstance(getattr(plant, "chief", None), Chief):
+    if not isinstance(plant, ChiefPlant):
         cure = "take plant=hcw, or leave truth null"
         raise ConfigurationError(f"evaluation.truth.type = {given.truth.type}: needs a chief on an orbit; {cure}")
     return construct(registry.load("plants", given.truth.type), given.truth, leader=plant.chief)
@@ -182,7 +182,7 @@ def state_of_differences(given: Mapping[str, Any], plant: Any) -> Floats:
     if given["linearised"]:
         linear: Floats = linearised_map(chief) @ differences
         return linear
-    return relative_state(chief, differences, getattr(plant, "frame_rate", None))
+    return relative_state(chief, differences, plant.frame_rate if isinstance(plant, TurningPlant) else None)
 
 
 def _scales(scales: Scales | None, what: str, instead: str) -> Scales:

@@ -16,6 +16,7 @@ from fracctl.config.options import construct, factory_of, named_factory, options
 from fracctl.controllers import Parameter
 from fracctl.errors import ArgumentError
 from fracctl.plants import LinearPlant
+from fracctl.plants.capabilities import OrbitalPlant
 from fracctl.surveys import axis_values
 
 LARGEST_GRID = 100_000_000
@@ -83,7 +84,7 @@ def initial_condition(value: Any, info: ValidationInfo) -> Strict:
 
 
 def _checked_differences(options: Strict, given: Mapping[str, Any], plant: Any) -> Strict:
-    if not hasattr(plant, "chief_elements"):
+    if not isinstance(plant, OrbitalPlant):
         raise refuse(refusal(("units",), "elements", "needs a plant with a chief on an orbit; give its states"))
     if not any(given[name] for name in DIFFERENCES):
         still = f"nothing moves, for all differences are 0; set one of {', '.join(DIFFERENCES)}"

@@ -17,6 +17,7 @@ from fracctl.controllers.parameters import Parameter
 from fracctl.controllers.references import Approach
 from fracctl.controllers.sliding_mode import REFERENCE_PARAMETERS, approach_of
 from fracctl.errors import UnsupportedError
+from fracctl.plants.capabilities import TensionedPlant
 from fracctl.plants.state import StatePlant
 
 
@@ -84,16 +85,15 @@ class FractionalSlidingMode:
         return cls(**own, reference=approach_of(table, len(components)))
 
     def numbers(self, plant: StatePlant, batch: int) -> Floats:
-        """Return the numbers of the law and ρ of the tether, (b, 9).
+        """Return the numbers of the law and ρ of the tether, (b, 8).
 
         Raises:
             UnsupportedError: the plant is no tether.
         """
-        mean = getattr(plant, "rho", None)
-        if mean is None:
+        if not isinstance(plant, TensionedPlant):
             raise UnsupportedError(f"FractionalSlidingMode is a law for a tether, not for {type(plant).__name__}")
         names = ("c_1", "b_1", "c_2", "kappa", "k", "eta", "boundary_layer")
-        values = [*(self._values[name] for name in names), np.array(mean)]
+        values = [*(self._values[name] for name in names), np.array(plant.rho)]
         return np.stack([np.broadcast_to(value, (batch,)) for value in values], axis=1)
 
     def orders(self, n_controls: int, batch: int) -> Floats:

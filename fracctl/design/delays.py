@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from fracctl.arrays import Array, Floats
 from fracctl.errors import ArgumentError, UnsupportedError
 from fracctl.loop import ClosedLoop
+from fracctl.plants.capabilities import SectionedPlant, period_of
 from fracctl.plants.state import Section, StatePlant
 from fracctl.solvers.method_of_steps import MethodOfSteps
 from fracctl.stepwise import Steps, StepwiseTrajectory
@@ -30,10 +31,10 @@ def natural_period(plant: StatePlant) -> float:
     Raises:
         UnsupportedError: the plant has none.
     """
-    period = getattr(plant, "period", None)
+    period = period_of(plant)
     if period is None:
         raise UnsupportedError(f"{type(plant).__name__} has no period of its own; use `first_return`, or give a delay")
-    return float(period)
+    return period
 
 
 def first_return(
@@ -55,7 +56,7 @@ def first_return(
             (a collision, an escape) ends it; the sentence names the first such member.
         UnsupportedError: there is no section.
     """
-    own = getattr(plant, "section", None) if section is None else section
+    own = plant.section if section is None and isinstance(plant, SectionedPlant) else section
     if own is None:
         raise UnsupportedError(f"{type(plant).__name__} has no section of its own; give `section`")
     trajectory = MethodOfSteps(steps).solve(ClosedLoop(plant), states, horizon)

@@ -32,7 +32,8 @@ def lqr(plant: LinearPlant, q: ArrayLike = 1.0, r: ArrayLike = 1.0, round_to: fl
             cost; the step is not positive.
         UnsupportedError: the plant is not linear.
     """
-    if not hasattr(plant, "stiffness"):
+    given: object = plant
+    if not isinstance(given, LinearPlant):
         cure = "use `lqr_at`, or controller=delayed_lqr"
         raise UnsupportedError(f"lqr takes linear plants, but {type(plant).__name__} is none; {cure}")
     m = plant.n_controls

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from scipy.optimize import OptimizeResult, minimize
 from scipy.stats import qmc
 
-from fracctl.arrays import Floats, finite, share
+from fracctl.arrays import Floats, finite, positive, share
 from fracctl.errors import ArgumentError
 from fracctl.stability.floquet import FEWEST_NODES, Neighbourhood
 from fracctl.stability.periodic_orbits import PeriodicOrbit
@@ -74,8 +74,7 @@ def minimise_largest_multiplier(
     if directions.ndim != 3 or directions.shape[1:] != shape:
         raise ArgumentError("basis", f"of shape {directions.shape}", f"must have shape (k, {shape[0]}, {shape[1]})")
     for name, value in (("starts", starts), ("reach", reach), ("evaluations", evaluations)):
-        if not value > 0:
-            raise ArgumentError(name, value, "must be positive")
+        positive(name, value)
     recall, near = share("recall", recall), [Neighbourhood(orbit, nodes) for orbit in orbits]
 
     def largest(coefficients: Floats, places: Sequence[Neighbourhood]) -> Floats:

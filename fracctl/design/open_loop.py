@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from scipy.linalg import expm
 from scipy.optimize import linprog
 
-from fracctl.arrays import Floats, finite
+from fracctl.arrays import Floats, finite, positive
 from fracctl.errors import ArgumentError
 from fracctl.plants.linear import LinearPlant
 
@@ -56,8 +56,7 @@ def least_effort(
     if start.shape != (2 * m,):
         raise ArgumentError("initial_state", f"of shape {start.shape}", f"must have shape ({2 * m},)")
     for name, value in (("time", time), ("peak", peak), ("segments", segments)):
-        if not value > 0:
-            raise ArgumentError(name, value, "must be positive")
+        positive(name, value)
     flow, response = _segment(plant, time / segments)
     reach = _after(flow, response, segments)
     target = -np.linalg.matrix_power(flow, segments) @ start

@@ -16,6 +16,7 @@ from fracctl.figures import labels
 from fracctl.figures.curves import Curve, curves_of, table_of
 from fracctl.figures.results import Results, Selection
 from fracctl.figures.style import BLUE, FULL_WIDTH_IN, GREY, ORANGE, STAR
+from fracctl.plants.capabilities import AngularPlant
 
 _PANEL_HEIGHT_IN = 2.15
 _MARGIN_HEIGHT_IN = 0.6
@@ -70,7 +71,7 @@ def _end(results: Results, curves: Sequence[Curve]) -> float:
 def _state(ax: Axes, curves: Sequence[Curve], component: str, results: Results, times: Floats) -> None:
     symbol, peak = labels.symbol(component), _peak(curves, component) or results.threshold or 0.0
     factor, note = labels.power_of_ten(peak)
-    angle = " (rad)" if component in getattr(results.plant, "angles", ()) else ""
+    angle = " (rad)" if isinstance(results.plant, AngularPlant) and component in results.plant.angles else ""
     ax.set_ylabel(f"position ${symbol}$" + angle + note)
     _draw(ax, curves, component, results.threshold, times, factor)
     if results.scales is not None:

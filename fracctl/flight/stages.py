@@ -15,6 +15,7 @@ from fracctl.errors import ArgumentError
 from fracctl.flight import uncertain
 from fracctl.flight.stage_names import CERTAIN, Stage
 from fracctl.loop import ClosedLoop
+from fracctl.plants.capabilities import names_dispersed
 from fracctl.plants.linear import LinearPlant
 from fracctl.plants.state import StatePlant
 from fracctl.sampled import Actuator, Memory, Navigation, SampledLaw, Window, dimensionless_time, memory_for
@@ -133,7 +134,7 @@ class Surroundings:
 
     @property
     def _of_truth(self) -> tuple[str, ...]:
-        return tuple(getattr(self.truth, "dispersed", ()))
+        return names_dispersed(self.truth)
 
     def drawn(self, samples: Floats) -> dict[str, Floats]:
         """Return the uncertain numbers of samples (b,), (b,) each."""

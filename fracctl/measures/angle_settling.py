@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fracctl.arrays import Floats
-from fracctl.errors import ArgumentError
+from fracctl.arrays import Floats, positive
 from fracctl.measures.base import OfTrajectories
 from fracctl.measures.mesh_cubics import cubics
 from fracctl.measures.tethers import targets, tether_of
@@ -33,9 +32,7 @@ class AngleSettling(OfTrajectories):
     )
 
     def __init__(self, threshold: float = 0.002) -> None:
-        if not 0.0 < threshold < np.inf:
-            raise ArgumentError("threshold", threshold, "must be positive")
-        self.threshold = float(threshold)
+        self.threshold = positive("threshold", threshold)
 
     def __call__(self, trajectory: MeshTrajectory) -> dict[str, Floats]:
         """Return settling, overshoot and largest excursion of both angles, (b,) each.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import wraps
+from importlib import import_module
 from typing import Any, Protocol, runtime_checkable
 
 from fracctl.arrays import Floats
@@ -93,8 +94,7 @@ def check_kind(name: str, wanted: str | None, trajectory: object) -> None:
 
 
 def _measures_of(trajectories: str) -> Iterator[str]:
-    from fracctl import measures
-
+    measures = import_module("fracctl.measures")  # the room itself, which lists this module's classes among others
     for name in measures.__all__:
         found = getattr(measures, name)
         if isinstance(found, type) and issubclass(found, OfTrajectories) and trajectories_of(found) == trajectories:

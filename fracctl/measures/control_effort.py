@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fracctl.arrays import Floats
-from fracctl.errors import ArgumentError
+from fracctl.arrays import Floats, positive
 from fracctl.features import absolute_integral
 from fracctl.measures.base import OfTrajectories
 from fracctl.measures.samples import samples_of
@@ -31,9 +30,7 @@ class ControlEffort(OfTrajectories):
     columns = ("control_effort",)
 
     def __init__(self, resolution: float | None = None) -> None:
-        if resolution is not None and not (np.isfinite(resolution) and resolution > 0.0):
-            raise ArgumentError("resolution", resolution, "must be positive")
-        self.resolution = resolution
+        self.resolution = None if resolution is None else positive("resolution", resolution)
 
     def __call__(self, trajectory: Trajectory) -> dict[str, Floats]:
         """Return column ``control_effort``, (b,)."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fracctl.arrays import Floats
+from fracctl.arrays import Floats, positive
 from fracctl.design.open_loop import least_effort
 from fracctl.errors import ArgumentError
 from fracctl.measures.control_effort import ControlEffort
@@ -37,9 +37,7 @@ class OpenLoopBound(InUnits):
     may_be_infinite = True
 
     def __init__(self, threshold_m: float = 100.0) -> None:
-        if not (np.isfinite(threshold_m) and threshold_m > 0.0):
-            raise ArgumentError("threshold_m", threshold_m, "must be positive")
-        self.threshold_m = float(threshold_m)
+        self.threshold_m = positive("threshold_m", threshold_m)
 
     def check(self) -> None:
         """Raise ArgumentError unless the plant is linear with constant coefficients and has units."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fracctl.arrays import Floats
+from fracctl.arrays import Floats, positive
 from fracctl.errors import ArgumentError
 from fracctl.features import largest_excursion
 from fracctl.measures.base import OfTrajectories
@@ -38,8 +38,8 @@ class Overshoot(OfTrajectories):
         if definition not in DEFINITIONS:
             raise ArgumentError("definition", repr(definition), f"must be one of {DEFINITIONS}")
         for name, value in (("scale", scale), ("resolution", resolution)):
-            if value is not None and not (np.isfinite(value) and value > 0.0):
-                raise ArgumentError(name, value, "must be positive")
+            if value is not None:
+                positive(name, value)
         self.definition, self.scale, self.resolution = definition, float(scale), resolution
 
     def __call__(self, trajectory: Trajectory) -> dict[str, Floats]:

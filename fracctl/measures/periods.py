@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike
 
 from fracctl.arrays import Floats, finite
 from fracctl.errors import ArgumentError, UnsupportedError
+from fracctl.plants.capabilities import period_of
 from fracctl.plants.state import SecondOrder
 from fracctl.stepwise import StepwiseTrajectory
 
@@ -52,8 +53,8 @@ def _last_delay(trajectory: StepwiseTrajectory) -> Floats:
 
 def plant_period(trajectory: StepwiseTrajectory) -> Floats | None:
     """Return the period of the plant, or of its leader's orbit, (); None where it has none."""
-    period = getattr(trajectory.plant, "period", None)
-    return None if period is None else np.array(float(period))
+    period = period_of(trajectory.plant)
+    return None if period is None else np.array(period)
 
 
 def n_positions(trajectory: StepwiseTrajectory) -> int:

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fracctl.arrays import Floats
-from fracctl.errors import ArgumentError
+from fracctl.arrays import Floats, positive
 from fracctl.measures.base import OfTrajectories
 from fracctl.measures.periods import SAMPLES, checked_period, differences, periods
 from fracctl.stepwise import StepwiseTrajectory
@@ -30,9 +29,7 @@ class SettlingPeriods(OfTrajectories):
     columns = ("settling_periods",)
 
     def __init__(self, threshold: float = 1e-6, period: ArrayLike | None = None) -> None:
-        if not (np.isfinite(threshold) and threshold > 0.0):
-            raise ArgumentError("threshold", threshold, "must be positive")
-        self.threshold, self.period = float(threshold), checked_period(period)
+        self.threshold, self.period = positive("threshold", threshold), checked_period(period)
 
     def __call__(self, trajectory: StepwiseTrajectory) -> dict[str, Floats]:
         """Return column ``settling_periods``, (b,).

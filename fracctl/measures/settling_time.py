@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fracctl.arrays import Array, Booleans, Floats
-from fracctl.errors import ArgumentError
+from fracctl.arrays import Array, Booleans, Floats, positive
 from fracctl.features import last_crossing, value_at
 from fracctl.measures.base import OfTrajectories
 from fracctl.trajectory import Trajectory
@@ -28,8 +27,8 @@ class SettlingTime(OfTrajectories):
 
     def __init__(self, threshold: float = 1e-5, resolution: float | None = None) -> None:
         for name, value in (("threshold", threshold), ("resolution", resolution)):
-            if value is not None and not (np.isfinite(value) and value > 0.0):
-                raise ArgumentError(name, value, "must be positive")
+            if value is not None:
+                positive(name, value)
         self.threshold, self.resolution = float(threshold), resolution
 
     def __call__(self, trajectory: Trajectory) -> dict[str, Floats]:

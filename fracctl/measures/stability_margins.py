@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fracctl.arrays import Floats
-from fracctl.errors import ArgumentError
+from fracctl.arrays import Floats, positive
 from fracctl.loop import ClosedLoop
 from fracctl.stability import margins, noise_gain
 from fracctl.stability.noise import SAMPLE_PERIOD
@@ -64,9 +63,7 @@ class NoiseGain:
     columns = ("noise_gain",)
 
     def __init__(self, sample_period: float = SAMPLE_PERIOD) -> None:
-        if not (np.isfinite(sample_period) and sample_period > 0.0):
-            raise ArgumentError("sample_period", sample_period, "must be positive")
-        self.sample_period = float(sample_period)
+        self.sample_period = positive("sample_period", sample_period)
 
     def of_loop(self, loop: ClosedLoop) -> dict[str, Floats]:
         """Return column ``noise_gain``, (b,)."""

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fracctl.arrays import positive
 from fracctl.elements import Elements, chief_elements
 from fracctl.errors import ArgumentError
 from fracctl.plants.linear import LinearPlant
@@ -49,8 +50,8 @@ class Chief:
             raise ArgumentError("altitude_km", self.altitude_km, allowed, "set one of the two to null")
         for name in ("semi_major_axis_km", "altitude_km", "gravitational_parameter_km3_s2"):
             value = getattr(self, name)
-            if value is not None and not (math.isfinite(value) and value > 0.0):
-                raise ArgumentError(name, value, "must be a positive number")
+            if value is not None:
+                positive(name, value)
         for name in ("inclination_deg", "raan_deg", "argument_of_latitude_deg"):
             if not math.isfinite(getattr(self, name)):
                 raise ArgumentError(name, getattr(self, name), "must be a finite number")

@@ -13,11 +13,12 @@ from fracctl.arrays import Array, Floats, finite
 from fracctl.compiling import compiled_with
 from fracctl.elements import Elements
 from fracctl.errors import ArgumentError
+from fracctl.plants.capabilities import of_rows
 from fracctl.plants.function import FunctionPlant
 from fracctl.plants.hcw import Chief
 from fracctl.plants.leader_orbit import LeaderOrbit
 from fracctl.plants.relative_motion import checked_phase
-from fracctl.plants.state import SecondOrder, of_rows
+from fracctl.plants.state import SecondOrder
 from fracctl.units import EARTH_RADIUS_KM
 
 EARTH_J2 = 1.08262668e-3

@@ -13,8 +13,9 @@ from fracctl.arrays import Array, Floats, finite
 from fracctl.compiling import compiled_with
 from fracctl.elements import Elements
 from fracctl.errors import ArgumentError
+from fracctl.plants.capabilities import of_rows
 from fracctl.plants.hcw import Chief
-from fracctl.plants.state import SecondOrder, of_rows
+from fracctl.plants.state import SecondOrder
 
 
 class AboutKeplerOrbit(SecondOrder):

@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from fracctl.arrays import Floats
+from fracctl.arrays import Floats, positive
 from fracctl.compiling import compiled_with
 from fracctl.errors import ArgumentError
 from fracctl.plants.state import Event, SecondOrder, Section
@@ -69,8 +69,7 @@ class RotatingEllipsoid(SecondOrder):
             "escape_radius": escape_radius,
         }
         for name, value in given.items():
-            if not (math.isfinite(value) and value > 0.0):
-                raise ArgumentError(name, value, "must be a positive number")
+            positive(name, value)
         self.c22, self.collision = float(c22), collision
         time = 3600.0 * rotation_period_h / (2.0 * math.pi)
         length_km = (gravitational_parameter_km3_s2 * time**2) ** (1.0 / 3.0)

@@ -6,10 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
-import numpy as np
-
-from fracctl.arrays import Array, Floats
-from fracctl.errors import ArgumentError
+from fracctl.arrays import Floats
 from fracctl.units import Scales
 
 
@@ -70,65 +67,6 @@ class StatePlant(Protocol):
     def jacobians(self, t: Floats, x: Floats, u: Floats) -> tuple[Floats, Floats]:
         """Return ∂f/∂x, (b, n, n), and ∂f/∂u, (b, n, m)."""
         ...
-
-
-@runtime_checkable
-class BatchedPlant(Protocol):
-    """A plant that may be another for each member; `rates` and `jacobians` then take one row a member, in order."""
-
-    @property
-    def batch(self) -> int | None:
-        """Batch size b, None where all members share the plant."""
-        ...
-
-    def take(self, rows: Array) -> StatePlant:
-        """Return the plant of some members; a member may be asked for more than once."""
-        ...
-
-
-@runtime_checkable
-class LimitedPlant(Protocol):
-    """A plant with limits of its controls, which hold in every loop that is not given others."""
-
-    limits: Floats
-    """Of the m controls, by axis, (1, m)."""
-
-
-@runtime_checkable
-class ConstrainedPlant(Protocol):
-    """A plant whose equations hold for some controls only: a tether pulls, and does not push."""
-
-    @property
-    def control_events(self) -> tuple[Event, ...]:
-        """What ends a run, or is recorded in it, with functions g(t, u) of the control instead of the state."""
-        ...
-
-
-def control_events(plant: object) -> tuple[Event, ...]:
-    """Return the events of the control that a plant has."""
-    return plant.control_events if isinstance(plant, ConstrainedPlant) else ()
-
-
-def batch_of(plant: object) -> int | None:
-    """Return the batch size of a plant, None where all members share it."""
-    return plant.batch if isinstance(plant, BatchedPlant) else None
-
-
-def members_of(plant: StatePlant, rows: Array) -> StatePlant:
-    """Return the plant of some members."""
-    return plant.take(rows) if isinstance(plant, BatchedPlant) and plant.batch is not None else plant
-
-
-def of_rows(numbers: Floats, rows: int) -> Floats:
-    """Return the numbers of members, (1, …) or (b, …), one for each row of states.
-
-    Raises:
-        ArgumentError: the rows are not those of the members.
-    """
-    if len(numbers) not in (1, rows):
-        allowed = f"must have a row for each member of the plant, {len(numbers)}"
-        raise ArgumentError("x", f"a batch of {rows}", allowed)
-    return numbers if len(numbers) == rows else np.repeat(numbers, rows, axis=0)
 
 
 class SecondOrder:

@@ -9,14 +9,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fracctl.arrays import Array, Floats, batch_size, finite
+from fracctl.arrays import Array, Floats, batch_size, finite, positive
 from fracctl.compiling import ACCELERATION, compiled_with, pointer_with
 from fracctl.errors import ArgumentError
-from fracctl.plants.state import Event, SecondOrder, of_rows
-from fracctl.units import EARTH_GRAVITATIONAL_PARAMETER_KM3_S2
-
-EARTH_RADIUS_KM = 6378.137
-"""Equatorial radius of the Earth, WGS 84."""
+from fracctl.plants.capabilities import of_rows
+from fracctl.plants.state import Event, SecondOrder
+from fracctl.units import EARTH_GRAVITATIONAL_PARAMETER_KM3_S2, EARTH_RADIUS_KM
 
 
 @pointer_with(ACCELERATION)
@@ -107,8 +105,7 @@ class Tether(SecondOrder):
             "longest": longest,
         }
         for name, value in given.items():
-            if not (math.isfinite(value) and value > 0.0):
-                raise ArgumentError(name, value, "must be a positive number")
+            positive(name, value)
         if not (len(tension) == 2 and 0.0 <= tension[0] < tension[1] < math.inf):
             raise ArgumentError("tension", tension, "must be two numbers, 0 <= least < largest")
         self.eccentricity, self.length_m, self.shortest = float(eccentricity), float(length_m), float(shortest)

@@ -11,7 +11,8 @@ from fracctl.comparison import ComparisonEvaluation as ComparisonEvaluated
 from fracctl.config import registry
 from fracctl.config.schemas import GridSurvey, RunConfig, SingleSurvey
 from fracctl.evaluation import Evaluation
-from fracctl.plants import Chief, LinearPlant
+from fracctl.plants import LinearPlant
+from fracctl.plants.capabilities import ChiefPlant
 from fracctl.report.numbers import count, number
 from fracctl.store import directory_of
 from fracctl.surveys import Survey, axis_values
@@ -66,10 +67,9 @@ def _spacecraft(config: RunConfig) -> Iterator[_Row]:
 
 def _plant(config: RunConfig, plant: LinearPlant) -> Iterator[_Row]:
     yield "plant", _sentence(plant, config.plant.type, "")
-    chief = getattr(plant, "chief", None)
-    if isinstance(chief, Chief):
-        orbit = f"circular orbit, radius {number(chief.a_km)} km"
-        yield "", f"chief on a {orbit}, inclination {number(chief.inclination_deg)}°"
+    if isinstance(plant, ChiefPlant):
+        orbit = f"circular orbit, radius {number(plant.chief.a_km)} km"
+        yield "", f"chief on a {orbit}, inclination {number(plant.chief.inclination_deg)}°"
     scales = plant.scales
     if scales is None:
         yield "", "dimensionless; T = 2π"

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from scipy.sparse import block_diag, csr_array, diags_array
 
-from fracctl.arrays import Floats
+from fracctl.arrays import Floats, positive
 from fracctl.controllers.linear import LinearLaw, LinearLawTerms
 from fracctl.errors import ArgumentError, UnsupportedError
 from fracctl.fractional.terms import FractionalTerm
@@ -45,8 +45,7 @@ class SampledLaw:
     feed: Literal["position", "velocity"] = "position"
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.period) and self.period > 0.0):
-            raise ArgumentError("period", self.period, "must be positive")
+        positive("period", self.period)
         if not (math.isfinite(self.delay) and self.delay >= 0.0):
             raise ArgumentError("delay", self.delay, "must not be negative")
         if self.feed not in ("position", "velocity"):

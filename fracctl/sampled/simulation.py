@@ -9,9 +9,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fracctl.arrays import Booleans, Floats, finite
+from fracctl.arrays import Booleans, Floats, finite, positive
 from fracctl.errors import ArgumentError
-from fracctl.plants.state import StatePlant, batch_of
+from fracctl.plants.capabilities import batch_of
+from fracctl.plants.state import StatePlant
 from fracctl.sampled.actuator import Actuator
 from fracctl.sampled.controller import DiscreteController
 from fracctl.sampled.law import SampledLaw
@@ -65,8 +66,7 @@ def simulate(
     start = _states(plant, initial_state)
     if anti_windup not in ("none", "hold_integrals", "restart"):
         raise ArgumentError("anti_windup", repr(anti_windup), "must be 'none', 'hold_integrals' or 'restart'")
-    if not (math.isfinite(horizon) and horizon > 0.0):
-        raise ArgumentError("horizon", horizon, "must be positive")
+    positive("horizon", horizon)
     members = list(range(len(start))) if numbers is None else list(numbers)
     if len(members) != len(start):
         raise ArgumentError("numbers", f"{len(members)} of them", f"must be as many as initial states, {len(start)}")

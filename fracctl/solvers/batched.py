@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fracctl.arrays import Array, Floats, finite
+from fracctl.arrays import Array, Floats, finite, positive
 from fracctl.characteristic.bounds import pole_radius
 from fracctl.characteristic.matrix import CharacteristicMatrix
 from fracctl.characteristic.winding import abscissa_bound, unstable_zeros, verdicts
@@ -17,7 +17,7 @@ from fracctl.errors import UnsupportedError
 from fracctl.fractional.system import LinearFractionalSystem, unsolved_for_highest
 from fracctl.loop import ClosedLoop, Need
 from fracctl.solvers.base import Survey
-from fracctl.solvers.members import Members, common_batch, equal_orders, positive
+from fracctl.solvers.members import Members, common_batch, equal_orders
 from fracctl.solvers.results import merged, without_trajectory
 from fracctl.trajectory import Trajectory
 

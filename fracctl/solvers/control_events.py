@@ -9,7 +9,8 @@ import numpy as np
 
 from fracctl.arrays import Floats
 from fracctl.meshwise import MeshTrajectory
-from fracctl.plants.state import Event, control_events
+from fracctl.plants.capabilities import control_events
+from fracctl.plants.state import Event
 from fracctl.stepwise import StepwiseTrajectory
 
 _HALVINGS = 50

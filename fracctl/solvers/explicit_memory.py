@@ -14,19 +14,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fracctl.arrays import Array, Booleans, Floats, finite, share
+from fracctl.arrays import Array, Booleans, Floats, finite, positive, share
 from fracctl.characteristic.matrix import CharacteristicMatrix
 from fracctl.characteristic.winding import unstable_zeros, verdicts
 from fracctl.errors import ArgumentError, UnsupportedError
 from fracctl.loop import ClosedLoop, Need
 from fracctl.panels import Panel, PanelGrid
+from fracctl.plants.capabilities import members_of
 from fracctl.plants.linear import LinearPlant
-from fracctl.plants.state import StatePlant, members_of
+from fracctl.plants.state import StatePlant
 from fracctl.solvers.base import Survey
 from fracctl.solvers.explicit_memory_law import highest_used, signals
 from fracctl.solvers.explicit_memory_mesh import step_edges
 from fracctl.solvers.explicit_memory_run import Problem, Run, run
-from fracctl.solvers.members import Members, common_batch, equal_orders, positive, whole
+from fracctl.solvers.members import Members, common_batch, equal_orders, whole
 from fracctl.solvers.results import merged
 from fracctl.trajectory import Trajectory
 

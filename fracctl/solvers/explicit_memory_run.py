@@ -11,7 +11,8 @@ from fracctl.arrays import Array, Booleans, Floats
 from fracctl.controllers.saturation import Saturation
 from fracctl.fractional.collocation import chebyshev_nodes, integral_matrix
 from fracctl.panels import Panel, PanelGrid
-from fracctl.plants.state import Event, StatePlant, control_events, members_of
+from fracctl.plants.capabilities import control_events, members_of
+from fracctl.plants.state import Event, StatePlant
 from fracctl.solvers.explicit_memory_history import History
 from fracctl.solvers.explicit_memory_law import Signals
 from fracctl.solvers.explicit_memory_mesh import crossings

@@ -8,18 +8,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fracctl.arrays import Array, Floats
+from fracctl.arrays import Array, Floats, positive
 from fracctl.controllers.delayed_feedback import DelayedLaw
 from fracctl.controllers.memory import MemoryLaw
 from fracctl.errors import ArgumentError, UnsupportedError
 from fracctl.fractional.sum_of_exponentials import sum_of_exponentials
 from fracctl.loop import ClosedLoop
 from fracctl.meshwise import MeshTrajectory
+from fracctl.plants.capabilities import CompiledPlant
 from fracctl.plants.state import Event, StatePlant
 from fracctl.solvers.control_events import ended_by_controls
 from fracctl.solvers.implicit_memory_equations import Given
 from fracctl.solvers.implicit_memory_kernel import BRACKETED, UNRESOLVED, Path, march, room_for
-from fracctl.solvers.members import positive, starting_states
+from fracctl.solvers.members import starting_states
 
 _GROWTH = 15.0
 """Share by which the first steps grow, over the largest step: 3 % for 2e-3, so that they are refined as the others."""
@@ -88,7 +89,7 @@ class ImplicitMemory:
             delayed = loop.controller is None or isinstance(loop.controller, DelayedLaw)
             instead = "method_of_steps" if delayed else "explicit_memory"
             return f"the {self.name} solver does not take {law}; use '{instead}'"
-        if getattr(loop.plant, "acceleration", None) is None:
+        if not isinstance(loop.plant, CompiledPlant):
             return f"the {self.name} solver needs a plant with a compiled acceleration, as Tether has"
         if loop.saturation is not None and loop.saturation.by != "axis":
             return f"the {self.name} solver limits each control by itself; use a saturation by axis"

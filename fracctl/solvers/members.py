@@ -116,14 +116,6 @@ def common_batch(loop: int | None, states: int | None) -> int:
     return sizes.pop() if sizes else 1
 
 
-def positive(name: str, value: float) -> float:
-    """Return a finite positive number, or refuse it."""
-    number = float(finite(name, value))
-    if number <= 0.0:
-        raise ArgumentError(name, number, "must be positive")
-    return number
-
-
 def whole(name: str, value: object, lowest: int, highest: int) -> int:
     """Return a whole number of a range, or refuse it."""
     if not (isinstance(value, int | np.integer) and lowest <= value <= highest):

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fracctl.arrays import Floats, finite
+from fracctl.arrays import Floats, finite, positive
 from fracctl.errors import ArgumentError
 from fracctl.plants.state import StatePlant
-from fracctl.solvers.members import positive, whole
+from fracctl.solvers.members import whole
 from fracctl.solvers.method_of_steps_mesh import Mesh
 from fracctl.solvers.method_of_steps_runs import run
 

@@ -74,7 +74,7 @@ TLS = ["scheduler=dask", *(f"scheduler.tls_{name}=a.pem" for name in ("ca_file",
         (["controller.k_p_w=null"], "controller.k_p_w = null: must be a number"),
         (["controller.type=pdx"], f"controller.type = pdx: must be one of {CONTROLLERS}; did you mean 'pd'?"),
         (["plant.type=moon"], f"plant.type = moon: must be one of {', '.join(names('plants'))}"),
-        (["plant.chief.semi_major_axis_km=-1"], "plant.chief.semi_major_axis_km = -1: must be a positive number"),
+        (["plant.chief.semi_major_axis_km=-1"], "plant.chief.semi_major_axis_km = -1: must be positive"),
         (["plant.chief.mass=1"], ("unknown key 'plant.chief.mass'; allowed: semi_major_axis_km, inclination_deg, "
                                  "gravitational_parameter_km3_s2, altitude_km, raan_deg, argument_of_latitude_deg")),
         (["plant.chief.altitude_km=500"], ("plant.chief.altitude_km = 500: must not be given beside semi_major_axis_km "

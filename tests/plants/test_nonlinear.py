@@ -160,7 +160,7 @@ def test_leader_keeps_to_keplers_equation() -> None:
         (lambda: Libration(eccentricity=1.0), r"`eccentricity` must lie in \[0, 1\)"),
         (lambda: Libration(inertia=np.nan), "`inertia` must be a finite number"),
         (lambda: RelativeMotion(eccentricity=-0.1), r"`eccentricity` must lie in \[0, 1\)"),
-        (lambda: RotatingEllipsoid(rotation_period_h=0.0), "`rotation_period_h` must be a positive number"),
+        (lambda: RotatingEllipsoid(rotation_period_h=0.0), "`rotation_period_h` must be positive"),
         (lambda: RotatingEllipsoid(collision="surface"), "`collision` must be 'point' or 'body', but is 'surface'"),
         (lambda: RotatingEllipsoid(semi_axes_km=(1.0,)), "`semi_axes_km` must be two numbers"),
         (lambda: FunctionPlant(lambda t, x, u: x, 0, 1), "`n_states` must be a whole number above 0"),

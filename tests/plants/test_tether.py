@@ -172,8 +172,8 @@ def test_the_tether_is_a_plant_in_the_true_anomaly() -> None:
     ("make", "sentence"),
     [
         (lambda: Tether(1.0), r"`eccentricity` must lie in \[0, 1\)"),
-        (lambda: Tether(length_m=0.0), "`length_m` must be a positive number"),
-        (lambda: Tether(shortest=math.inf), "`shortest` must be a positive number"),
+        (lambda: Tether(length_m=0.0), "`length_m` must be positive"),
+        (lambda: Tether(shortest=math.inf), "`shortest` must hold finite numbers only"),
         (lambda: Tether(tension=(5.0, 0.1)), "`tension` must be two numbers, 0 <= least < largest"),
         (lambda: Tether(tension=(1.0,)), "`tension` must be two numbers"),
         (lambda: Tether(disturbance=0.1), r"`disturbance` must have shape \(3,\) or \(b, 3\), but is of shape \(\)"),
