@@ -71,9 +71,6 @@ class CharacteristicMatrix:
     """
 
     def __init__(self, system: LinearFractionalSystem) -> None:
-        refusal = unsolved_for_highest(system, "the characteristic equation")
-        if refusal:
-            raise UnsupportedError(refusal)
         self.system = system
         self.size = system.size
         self.batch = system.batch or 1
@@ -169,9 +166,11 @@ def _entries(system: LinearFractionalSystem) -> list[list[Entry | None]]:
     highest, size = system.highest.tolist(), range(system.size)
     shared: list[list[dict[float, Floats]]] = [[{} for _ in size] for _ in size]
     own: list[list[list[tuple[Floats, Floats]]]] = [[[] for _ in size] for _ in size]
-    for term in system.dynamics:
+    for number, term in enumerate(system.dynamics):
         for i, k in np.argwhere(term.matrix.any(axis=0) if term.matrix.ndim == 3 else term.matrix).tolist():
             coefficient, order = term.matrix[..., i, k], term.orders[..., k] - highest[k]
+            if number and order.max() >= 0.0:
+                raise UnsupportedError(unsolved_for_highest(system, "the characteristic equation"))
             if order.ndim == 0:
                 known = shared[i][k]
                 known[float(order)] = known[float(order)] + coefficient if float(order) in known else coefficient

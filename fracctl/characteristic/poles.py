@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from fracctl.arrays import Complexes
+from fracctl.arrays import Complexes, Floats
 from fracctl.characteristic.bounds import pole_radius
-from fracctl.characteristic.matrix import CharacteristicMatrix
+from fracctl.characteristic.matrix import CharacteristicMatrix, Powers
 from fracctl.characteristic.zeros import Terms, phase_change, search
 from fracctl.errors import ArgumentError
 
@@ -23,9 +23,10 @@ _MESHES = ((16, 5), (50, 17), (250, 61))
 def principal_poles(matrix: CharacteristicMatrix) -> tuple[Complexes, bool]:
     """Return all zeros of det M̃ with |arg σ| < π, and whether their number is that of the argument principle.
 
-    Newton's iteration from a polar mesh of the upper half disc of the pole radius, with the zeros found so far
-    divided out; a double zero is found twice, one with |σ| < 4e-18 not at all. For integer orders the zeros on the
-    negative real axis are found as well.
+    Groups of coordinates that are not coupled are taken one by one. For integer orders the poles are the eigenvalues
+    of the first-order form, those on the negative real axis among them. Otherwise, Newton's iteration from a polar mesh
+    of the upper half disc of the pole radius, with the zeros found so far divided out; a double zero is found twice,
+    one with |σ| < 4e-18 not at all.
 
     Args:
         matrix: the characteristic matrix of a single loop (batch of one).
@@ -38,40 +39,38 @@ def principal_poles(matrix: CharacteristicMatrix) -> tuple[Complexes, bool]:
     """
     if matrix.batch != 1:
         raise ArgumentError("matrix", f"a batch of {matrix.batch}", "must belong to a single loop")
-    if _integer_orders(matrix):
-        return _companion_eigenvalues(matrix), True
-    terms, outer = _terms(matrix), float(np.log(pole_radius(matrix)[0]))
+    outer = float(np.log(pole_radius(matrix)[0]))
+    parts = [_of_block(matrix.powers_of(block), matrix.highest[block], outer) for block in matrix.blocks()]
+    return by_real_part(np.concatenate([poles for poles, _ in parts])), all(complete for _, complete in parts)
+
+
+def by_real_part(poles: Complexes) -> Complexes:
+    """Return poles by descending real part, conjugate pairs together, that above the axis first."""
+    return poles[np.lexsort((-poles.imag, np.abs(poles.imag), -poles.real))]
+
+
+def _of_block(powers: Powers, highest: Floats, outer: float) -> tuple[Complexes, bool]:
+    """Return the zeros of a block and whether they are all; log |σ| is below `outer`."""
+    orders = powers.exponents[0] + highest[powers.place[:, 1]]
+    if np.all(orders % 1.0 == 0.0):
+        return _companion_eigenvalues(powers, orders, highest), True
+    rows, columns = np.ascontiguousarray(powers.place.T)
+    terms = Terms(len(highest), powers.coefficients[0], powers.exponents[0], rows, columns)
     expected = _count(terms, outer)
     found = np.zeros(0, dtype=np.complex128)
     for n_radii, n_angles in _MESHES:
         found = search(terms, _mesh(outer, n_radii, n_angles), expected, np.pi - _LIP)
         if len(found) >= expected:
             break
-    poles = np.exp(found)
-    return poles[np.lexsort((-poles.imag, np.abs(poles.imag), -poles.real))], len(poles) == expected
+    return np.exp(found), len(found) == expected
 
 
-def _integer_orders(matrix: CharacteristicMatrix) -> bool:
-    return all(np.all(term.orders[term.matrix.any(axis=-2)] % 1.0 == 0.0) for term in _squeezed(matrix))
-
-
-def _squeezed(matrix: CharacteristicMatrix) -> list[_Term]:
-    return [_Term(t.matrix.reshape(t.matrix.shape[-2:]), t.orders.reshape(-1)) for t in matrix.system.dynamics]
-
-
-class _Term:
-    def __init__(self, matrix: np.ndarray, orders: np.ndarray) -> None:
-        self.matrix, self.orders = matrix, orders
-
-
-def _companion_eigenvalues(matrix: CharacteristicMatrix) -> Complexes:
+def _companion_eigenvalues(powers: Powers, orders: Floats, highest: Floats) -> Complexes:
     """Eigenvalues of the first-order form, for orders -1, 0, 1, 2 (order -1 adds as many integrals as it has rank)."""
-    p, m = matrix.size, matrix.system.n_positions
+    p, m = len(highest), int(np.sum(highest == 2.0))
     blocks = {order: np.zeros((p, p)) for order in (-1, 0, 1, 2)}
-    for term in _squeezed(matrix):
-        for k, order in enumerate(term.orders):
-            if term.matrix[:, k].any():
-                blocks[int(order)][:, k] += term.matrix[:, k]
+    for (row, column), order, coefficient in zip(powers.place, orders, powers.coefficients[0], strict=True):
+        blocks[int(order)][row, column] += coefficient
     left, sizes, right = np.linalg.svd(blocks[-1])
     rank = int(np.sum(sizes > 1e-13 * sizes[0]))
     # state: y (p), rates of positions (m), integrals of combinations of y (rank)
@@ -82,17 +81,7 @@ def _companion_eigenvalues(matrix: CharacteristicMatrix) -> Complexes:
     companion[rows, p : p + m] = -blocks[1][:, :m]
     companion[rows, p + m :] = -left[:, :rank] * sizes[:rank]
     companion[p + m :, :p] = right[:rank]
-    values = np.linalg.eigvals(companion).astype(np.complex128)
-    return values[np.lexsort((-values.imag, np.abs(values.imag), -values.real))]
-
-
-def _terms(matrix: CharacteristicMatrix) -> Terms:
-    entries = [(i, k, entry) for i, row in enumerate(matrix.entries) for k, entry in enumerate(row) if entry]
-    counts = [entry.exponents.shape[-1] for _, _, entry in entries]
-    rows, columns = (np.repeat([entry[axis] for entry in entries], counts) for axis in (0, 1))
-    coefficients = np.concatenate([entry.coefficients.ravel() for _, _, entry in entries])
-    exponents = np.concatenate([entry.exponents.ravel() for _, _, entry in entries])
-    return Terms(matrix.size, coefficients, exponents, rows, columns)
+    return np.linalg.eigvals(companion).astype(np.complex128)
 
 
 def _count(terms: Terms, outer: float) -> int:

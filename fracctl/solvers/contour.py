@@ -18,9 +18,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fracctl.arrays import Array, Floats, share
-from fracctl.characteristic.bounds import pole_height
+from fracctl.arrays import Array, Booleans, Floats, share
+from fracctl.characteristic.bounds import SMALLEST_RADIUS, pole_height
 from fracctl.characteristic.matrix import CharacteristicMatrix
+from fracctl.characteristic.poles import principal_poles
 from fracctl.errors import ArgumentError, UnsupportedError
 from fracctl.solvers.base import Survey
 from fracctl.solvers.batched import BatchSolver
@@ -38,6 +39,10 @@ _SERIES_ORDER, _COUPLED_SERIES_ORDER = 6, 5
 
 _SPREAD = 2.0
 """Ratios of pole radius and height within this factor share a contour."""
+_MANY = 1000.0
+"""Imaginary part times horizon from which computing poles takes less time than it saves."""
+_CLEAR = 1.02
+"""Height of the contours over computed poles."""
 
 
 @dataclass(frozen=True)
@@ -98,7 +103,8 @@ class Contour(BatchSolver):
         cost = np.zeros(len(radius), dtype=np.int64)
         single = members.system.n_positions == 1
         order = _SERIES_ORDER if members.system.size == 1 else _COUPLED_SERIES_ORDER
-        height = pole_height(CharacteristicMatrix(members.system), radius)
+        first = _ATTEMPTS[0].width if single else _ATTEMPTS[0].coupled
+        height, known = _heights(members, rows, radius, first)
         batch = loops(members.system, members.y0, members.rate, members.every, order)
         for attempt in _ATTEMPTS:
             last = attempt is _ATTEMPTS[-1]
@@ -121,7 +127,7 @@ class Contour(BatchSolver):
                     continue
                 cost[group.rows] += plan.nodes
                 for some, response, enclosed in responses(batch, group.rows, plan):
-                    good = enclosed & (response.error.max(axis=0) <= self.tolerance)
+                    good = (enclosed | known[some]) & (response.error.max(axis=0) <= self.tolerance)
                     done = good if not last else np.ones_like(good)
                     missed.append(some[~done])
                     if done.any():
@@ -130,6 +136,21 @@ class Contour(BatchSolver):
             rows = np.concatenate([np.zeros(0, dtype=np.intp), *missed])
             if not rows.size:
                 return
+
+
+def _heights(members: Members, rows: Array, radius: Floats, width: float) -> tuple[Floats, Booleans]:
+    """Return bounds on the imaginary parts of poles over the `width` of the first contours, and which are exact, (b,).
+
+    Where the quick bound asks for many nodes, as the pole radius of an overdamped loop does, all poles are computed.
+    Then contours enclose them by design, also where nodes are too far apart to count a pole next to the cut.
+    """
+    matrix = CharacteristicMatrix(members.system)
+    height, known = pole_height(matrix, radius).copy(), np.zeros(len(radius), dtype=np.bool_)
+    for row in rows[width * height[rows] * members.horizon > _MANY]:
+        poles, known[row] = principal_poles(matrix.take(np.array([row])))
+        if known[row]:
+            height[row] = max(_CLEAR * float(np.abs(poles.imag).max(initial=0.0)) / width, SMALLEST_RADIUS)
+    return height, known
 
 
 def _classes(rows: Array, height: Floats, radius: Floats, shift: Floats, ratio: float, fill: bool) -> Iterator[_Group]:

@@ -79,13 +79,18 @@ def design(tolerance: float, ratio: float, height: float) -> ContourShape:
         count = np.where(covers & clears_cut, count, np.inf)
     best = np.unravel_index(np.argmin(count), count.shape)
     if not np.isfinite(count[best]):
-        raise UnsupportedError(
-            f"poles times horizon reach {height:.3g} rad, too many oscillations for the contour solver; "
-            "shorten the horizon or lower the gains"
-        )
+        raise too_many_oscillations(height)
     nodes = int(np.ceil(count[best]))
     vertex = float(c[best[0], 0, 0, 0])
     return ContourShape(vertex, float(nu[best[1], 0, 0]), float(kappa[best]), float(step[best]), nodes)
+
+
+def too_many_oscillations(height: float) -> UnsupportedError:
+    """Return the refusal of poles whose imaginary parts times the horizon reach `height`."""
+    return UnsupportedError(
+        f"imaginary parts of poles times the horizon reach {height:.3g} rad, too many oscillations for the contour"
+        " solver; shorten the horizon or lower the gains"
+    )
 
 
 def _downward_step(c: Floats, nu: Floats, kappa: Floats, decades: float) -> Floats:

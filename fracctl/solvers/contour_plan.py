@@ -11,7 +11,7 @@ import numpy as np
 
 from fracctl.arrays import Array, Complexes, Floats
 from fracctl.panels import Panel, PanelGrid
-from fracctl.solvers.contour_design import ContourShape, design
+from fracctl.solvers.contour_design import ContourShape, design, too_many_oscillations
 from fracctl.solvers.sampling import FIRST_TIME, LOGARITHMIC_NODES, panel_nodes
 
 RATIOS = (3.0, 4.0, 5.0, 6.0, 7.0, 8.0)
@@ -20,6 +20,8 @@ _CHECKED = 5
 """Times of a window at which the two rules are compared."""
 _LONGEST = 36.0
 """Half-length of a panel times the largest frequency, beyond which a window is split."""
+_LARGEST = 5e8
+"""Bytes of e^{σt} on all windows; kernels take as many again for each derivative."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,6 +107,9 @@ def make_plan(horizon: float, hull: float, radius: float, shift: float, toleranc
         shift: a, bound on the real parts of poles in the right half plane, 0 for stable loops.
         tolerance: relative error of the quadrature.
         series_order: highest exponent of the power series near t = 0.
+
+    Raises:
+        UnsupportedError: the poles oscillate too often up to the horizon.
     """
     span = max(horizon * (radius + shift) / _series_reach(tolerance, series_order), 2.0)
     count = int(np.ceil(np.log(span) / np.log(RATIOS[-1])))
@@ -114,12 +119,13 @@ def make_plan(horizon: float, hull: float, radius: float, shift: float, toleranc
     panels = [Panel(horizon * FIRST_TIME, float(edges[0]), LOGARITHMIC_NODES, logarithmic=True)]
     groups = [_panels(float(a), float(b), hull, tolerance) for a, b in itertools.pairwise(edges)]
     grid = PanelGrid([*panels, *(panel for group in groups for panel in group)])
-    windows, first = [], 1
-    for group in groups:
-        where = slice(int(grid.offsets[first]), int(grid.offsets[first + len(group)]))
-        first += len(group)
-        shape = design(tolerance, ratio, _rounded_up(hull * group[-1].end))
-        windows.append(_window(shape, where, grid, radius, shift))
+    ends = np.cumsum([1, *(len(group) for group in groups)])
+    places = [slice(int(grid.offsets[a]), int(grid.offsets[b])) for a, b in itertools.pairwise(ends)]
+    shapes = [design(tolerance, ratio, _rounded_up(hull * group[-1].end)) for group in reversed(groups)][::-1]
+    size = sum(32.0 * shape.nodes * (where.stop - where.start) for shape, where in zip(shapes, places, strict=True))
+    if size > _LARGEST:
+        raise too_many_oscillations(hull * horizon)
+    windows = [_window(shape, where, grid, radius, shift) for shape, where in zip(shapes, places, strict=True)]
     return Plan(grid, tuple(windows), float(series_order))
 
 

@@ -70,11 +70,11 @@ def without_trajectory(members: Members, status: str) -> Survey:
 
 
 def merged(parts: list[Survey], batch: int, common: PanelGrid | None = None) -> Trajectory:
-    """Bring all members to one grid, by default that with most nodes."""
+    """Bring all members to one grid, by default one that resolves them all."""
     first = parts[0].trajectory
     if len(parts) == 1 and np.array_equal(parts[0].rows, np.arange(batch)):
         return first
-    grid = common or max((part.trajectory.grid for part in parts), key=lambda g: len(g.times))
+    grid = common or _resolving([part.trajectory.grid for part in parts])
     times = grid.times.copy()
     last = grid.offsets[1:] - 1
     times[last] = np.nextafter(times[last], 0.0)
@@ -108,3 +108,16 @@ def merged(parts: list[Survey], batch: int, common: PanelGrid | None = None) -> 
         error_estimate=joined("error_estimate"),
         counters={"nodes": np.concatenate([part.trajectory.counters["nodes"] for part in parts])[place]},
     )
+
+
+def _resolving(grids: list[PanelGrid]) -> PanelGrid:
+    """Return the grid with most nodes, its first panel replaced by those of the grid whose own ends first.
+
+    The most nodes are those of the fastest oscillation; what decays without one is resolved by short panels near 0.
+    """
+    most, early = max(grids, key=lambda g: len(g.times)), min(grids, key=lambda g: g.panels[0].end)
+    edge = most.panels[0].end
+    if early.panels[0].end >= edge:
+        return most
+    before = [replace(panel, end=min(panel.end, edge)) for panel in early.panels if panel.start < edge]
+    return PanelGrid([*before, *most.panels[1:]])

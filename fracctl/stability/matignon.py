@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
 
 from fracctl.arrays import Array, Complexes, Floats
-from fracctl.errors import ArgumentError, UnsupportedError
-from fracctl.fractional.system import LinearFractionalSystem, unsolved_for_highest
+from fracctl.characteristic.matrix import CharacteristicMatrix
+from fracctl.characteristic.poles import by_real_part
+from fracctl.errors import ArgumentError
+from fracctl.fractional.system import LinearFractionalSystem
 from fracctl.loop import ClosedLoop
 from fracctl.stability.assess import ON_THE_AXIS, Verdict
 
@@ -39,7 +42,8 @@ def matignon(loop: ClosedLoop, largest_denominator: int = 100) -> PseudoStateVer
     D^(1/q) x = A x. The loop is asymptotically stable exactly if |arg w| > π/(2q) for every eigenvalue w of A; those
     with |arg w| < π/q are its principal-sheet poles σ = w^q. Powers of w that a column has in common are factors
     of the determinant and are taken out of it, for as eigenvalues w = 0 of high multiplicity they would be lost to
-    rounding.
+    rounding. Groups of coordinates that are not coupled are judged one by one, those of integer orders with q = 1, for
+    which poles on the negative real axis count as well.
 
     Args:
         loop: the closed loop.
@@ -54,16 +58,15 @@ def matignon(loop: ClosedLoop, largest_denominator: int = 100) -> PseudoStateVer
     """
     if loop.batch is not None:
         raise ArgumentError("loop", f"a batch of {loop.batch}", "must be a single loop; solve a batch for its verdicts")
-    refusal = unsolved_for_highest(loop.system, "the pseudo-state matrix")
-    if refusal:
-        raise UnsupportedError(refusal)
-    q, powers = _polynomial(loop.system, largest_denominator)
-    lowest = np.array([min(n for n, matrix in powers.items() if matrix[:, k].any()) for k in range(loop.system.size)])
-    shifted = _without_common_powers(powers, lowest)
-    companion = _companion(shifted, (q * loop.system.highest).astype(int) - lowest)
-    eigenvalues = np.linalg.eigvals(companion).astype(np.complex128)
-    poles = _principal(eigenvalues, q)
-    stable, reason = _decided(poles, _singular(shifted[0]) or lowest.sum() > 0, q)
+    blocks = CharacteristicMatrix(loop.system).blocks()
+    polynomials = [_polynomial(loop.system, block, largest_denominator) for block in blocks]
+    q = _denominator([order for powers in polynomials for order in powers], largest_denominator)
+    parts = [
+        _eigenvalues(powers, loop.system.highest[block]) for powers, block in zip(polynomials, blocks, strict=True)
+    ]
+    eigenvalues = np.concatenate([_roots(w, q // own) for w, own, _ in parts])
+    poles = by_real_part(np.concatenate([_principal(w, own) for w, own, _ in parts]))
+    stable, reason = _decided(poles, any(at_origin for _, _, at_origin in parts), q)
     return PseudoStateVerdict(
         stable=stable,
         poles=poles,
@@ -83,21 +86,43 @@ def _decided(poles: Complexes, at_origin: bool, q: int) -> tuple[bool | None, st
     return count == 0, f"{count} eigenvalues with |arg w| < π/{2 * q}"
 
 
-def _polynomial(system: LinearFractionalSystem, largest: int) -> tuple[int, dict[int, Floats]]:
-    """Return q, and the matrices (p, p) of Σ_n A_n w^n = M(w^q)."""
-    p = system.size
+def _polynomial(system: LinearFractionalSystem, block: list[int], largest: int) -> dict[Fraction, Floats]:
+    """Return by order the matrices (p, p) of M(σ) of a block of p coordinates."""
     powers: dict[Fraction, Floats] = {}
     for term in system.dynamics:
-        matrix, orders = term.matrix.reshape(p, p), term.orders.reshape(p)
+        matrix = term.matrix.reshape(system.size, system.size)[np.ix_(block, block)]
+        orders = term.orders.reshape(system.size)[block]
         for k in np.flatnonzero(matrix.any(axis=0)):
             order = Fraction(float(orders[k])).limit_denominator(largest)
             if abs(float(order) - orders[k]) > _SAME_ORDER:
                 raise _refusal(f"{orders[k]:.12g}", largest)
-            powers.setdefault(order, np.zeros((p, p)))[:, k] += matrix[:, k]
-    q = math.lcm(*(order.denominator for order in powers))
+            powers.setdefault(order, np.zeros(matrix.shape))[:, k] += matrix[:, k]
+    return powers
+
+
+def _denominator(orders: Collection[Fraction], largest: int) -> int:
+    q = math.lcm(*(order.denominator for order in orders))
     if q > largest:
-        raise _refusal(", ".join(str(order) for order in sorted(powers)), largest)
-    return q, {int(order * q): matrix for order, matrix in powers.items()}
+        raise _refusal(", ".join(str(order) for order in sorted(set(orders))), largest)
+    return q
+
+
+def _eigenvalues(polynomial: dict[Fraction, Floats], highest: Floats) -> tuple[Complexes, int, bool]:
+    """Return w of a block with its own q, that q, and whether det M vanishes at 0 besides."""
+    q = math.lcm(*(order.denominator for order in polynomial))
+    powers = {int(order * q): matrix for order, matrix in polynomial.items()}
+    lowest = np.array([min(n for n, matrix in powers.items() if matrix[:, k].any()) for k in range(len(highest))])
+    shifted = _without_common_powers(powers, lowest)
+    companion = _companion(shifted, (q * highest).astype(int) - lowest)
+    w = np.linalg.eigvals(companion).astype(np.complex128)
+    return w, q, _singular(shifted[0]) or lowest.sum() > 0
+
+
+def _roots(values: Complexes, n: int) -> Complexes:
+    """Return all n-th roots."""
+    turns = np.exp(2j * np.pi * np.arange(n) / n)
+    roots: Complexes = ((np.abs(values) ** (1.0 / n) * np.exp(1j * np.angle(values) / n))[:, None] * turns).ravel()
+    return roots
 
 
 def _refusal(orders: str, largest: int) -> ArgumentError:
@@ -129,11 +154,11 @@ def _companion(powers: dict[int, Floats], degrees: Array) -> Floats:
 
 
 def _principal(eigenvalues: Complexes, q: int) -> Complexes:
-    """Return σ = w^q of the eigenvalues on the principal sheet, by descending real part, conjugate pairs together."""
+    """Return σ = w^q of the eigenvalues on the principal sheet."""
     angles = q * np.angle(eigenvalues)
     chosen = np.abs(angles) < np.pi - _ON_THE_CUT if q > 1 else np.ones(len(angles), dtype=bool)
     poles: Complexes = (np.abs(eigenvalues) ** q * np.exp(1j * angles))[chosen]
-    return poles[np.lexsort((-poles.imag, np.abs(poles.imag), -poles.real))]
+    return poles
 
 
 def _singular(matrix: Floats) -> bool:

@@ -6,9 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
 
 from fracctl.controllers import PDAlpha
-from fracctl.errors import ArgumentError
+from fracctl.errors import ArgumentError, UnsupportedError
 from fracctl.loop import ClosedLoop
 from fracctl.plants import HCWInPlane, HCWOutOfPlane, LinearPlant
 from fracctl.solvers import Contour, solve
@@ -312,3 +313,49 @@ def test_times_outside_the_horizon_are_refused(time: float) -> None:
 def test_initial_states_of_wrong_shape_are_refused() -> None:
     with pytest.raises(ArgumentError, match="`initial_state` must"):
         Contour().solve(closed_loop(OUT_OF_PLANE[:1]), np.zeros(3), 6.0)
+
+
+OVERDAMPED = [20.0, 100.0, 200.0, 1000.0, 1e4]
+
+
+@pytest.mark.parametrize("size", [1, 2])
+def test_overdamped_loops_take_few_nodes(size: int) -> None:
+    """Poles at -k_D and -2/k_D do not oscillate, though their radius times the horizon reaches 4e5 rad."""
+    horizon, count = 12.0 * np.pi, len(OVERDAMPED)
+    plant, gain = (
+        (HCWOutOfPlane(), np.ones((1, 1))) if size == 1 else (HCWInPlane(), np.array([[1.0, 0.2], [0.1, 0.7]]))
+    )
+    k_p, k_d = 4.0 * np.eye(size), np.array(OVERDAMPED)[:, None, None] * gain
+    law = PDAlpha(4.0, OVERDAMPED, 1.0) if size == 1 else PDAlpha(np.broadcast_to(k_p, k_d.shape), k_d, 1.0)
+    start, times = np.concatenate([np.full(size, 1e-3), np.full(size, 2e-3)]), np.geomspace(1e-6, horizon, 40)
+    trajectory = Contour().solve(ClosedLoop(plant, law), start, horizon)
+    assert list(trajectory.status) == ["ok"] * count
+    assert trajectory.counters["nodes"].max() < 1500
+    for i in range(count):
+        matrix = np.block([[np.zeros((size, size)), np.eye(size)], [plant.stiffness - k_p, plant.damping - k_d[i]]])
+        exact = np.array([expm(matrix * time) @ start for time in times])
+        controls = -exact @ np.hstack([k_p, k_d[i]]).T
+        both = (trajectory(times)[i, :, :size], exact[:, :size]), (trajectory.control(times)[i], controls)
+        for found, wanted in both:
+            assert np.abs(found - wanted).max() < 1e-8 * np.abs(wanted).max()
+
+
+def test_an_overdamped_loop_with_memory() -> None:
+    """k_D = 200 at α = 0.9: poles near 124 e^(±0.909 πi), of half the radius of k_D and a third of that high."""
+    member = loops.out_of_plane(1.0, 200.0, 0.9, [1e-3, 2e-3])
+    trajectory = solve_batch([member], 12.0 * np.pi)
+    times = check_times(12.0 * np.pi)
+    exact = Reference(member, 16)(times)
+    assert trajectory.status[0] == "ok"
+    assert np.abs(trajectory(times)[0, :, :1] - exact.position).max() < 1e-8 * np.abs(exact.position).max()
+    assert np.abs(trajectory.control(times)[0] - exact.control).max() < 1e-8 * np.abs(exact.control).max()
+
+
+@pytest.mark.parametrize("k_p", [1e5, 1e8])
+def test_too_many_oscillations_are_refused_at_once(k_p: float) -> None:
+    """Poles at ±316i and ±1e4 i: the first would take gigabytes, the second more nodes than any design has."""
+    loop = ClosedLoop(HCWOutOfPlane(), PDAlpha(k_p, 2.0, 1.0))
+    with pytest.raises(UnsupportedError, match="imaginary parts of poles times the horizon reach") as refusal:
+        Contour().solve(loop, np.array([0.0, 1.0]), 12.0 * np.pi)
+    reached = float(str(refusal.value).split("reach ")[1].split(" rad")[0])
+    assert np.sqrt(k_p) * 12.0 * np.pi < reached < 1.5 * np.sqrt(k_p) * 12.0 * np.pi

@@ -14,6 +14,7 @@ from fracctl.errors import ArgumentError, UnsupportedError
 from fracctl.fractional.terms import FractionalTerm
 from fracctl.loop import ClosedLoop
 from fracctl.plants import HCW, HCWInPlane, HCWOutOfPlane, LinearPlant
+from fracctl.stability.assess import Verdict
 from tests.references import loops, poles
 from tests.references.loops import Loop
 
@@ -61,6 +62,19 @@ def test_poles_at_integer_orders_are_eigenvalues() -> None:
         expected = np.linalg.eigvals(poles.companion(member))
         assert same_set(verdict.poles, expected, 1e-9)
         assert verdict.stable is bool(np.all(expected.real < 0))
+
+
+@pytest.mark.parametrize("criterion", [stability.assess, stability.matignon])
+def test_integer_orders_beside_others_have_their_real_poles(criterion: Callable[[ClosedLoop], Verdict]) -> None:
+    """w'' + 5 w' + 3 w = 0 has the poles (-5 ± √13)/2, whatever the orders in plane, which has its own."""
+    k_p, k_d = np.diag([4.0, 2.0, 2.0]), np.diag([2.0, 2.0, 5.0])
+    found = criterion(ClosedLoop(HCW(), PDAlpha(k_p, k_d, [0.9, 0.9, 1.0])))
+    plane = criterion(ClosedLoop(HCWInPlane(), PDAlpha(k_p[:2, :2], k_d[:2, :2], [0.9, 0.9])))
+    real = 0.5 * (-5.0 + np.array([1.0, -1.0]) * np.sqrt(13.0))
+    assert len(plane.poles) == 4
+    assert same_set(found.poles, np.append(plane.poles, real), 1e-9)
+    assert np.all(np.diff(found.poles.real) <= 1e-9)
+    assert found.stable is True
 
 
 def test_number_of_poles_jumps_at_order_one() -> None:

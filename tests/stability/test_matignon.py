@@ -80,6 +80,15 @@ def test_every_eigenvalue_solves_the_characteristic_equation() -> None:
     assert same_set(verdict.eigenvalues, expected, 1e-12)
 
 
+def test_eigenvalues_of_uncoupled_coordinates_are_of_one_denominator() -> None:
+    """w⁴ + 2 w + 1.5 = 0 and (w²)² + 3 w² + 1.7 = 0 for σ = w²: half and whole orders in one system."""
+    law = PDAlpha(np.diag([0.5, 0.7]), np.diag([2.0, 3.0]), [0.5, 1.0])
+    verdict = stability.matignon(ClosedLoop(LinearPlant(-np.eye(2)), law))
+    assert verdict.denominator == 2
+    expected = np.concatenate([np.roots([1.0, 0.0, 0.0, 2.0, 1.5]), np.roots([1.0, 0.0, 3.0, 0.0, 1.7])])
+    assert same_set(verdict.eigenvalues, expected, 1e-12)
+
+
 @pytest.mark.parametrize("k_d", [0.5, -0.5])
 def test_the_sector_decides(k_d: float) -> None:
     """Two unstable poles for k_D < 0 lie in |arg w| < π/(2q), and none does for k_D > 0."""
