@@ -10,6 +10,8 @@ import pytest
 
 import fracctl as fc
 from fracctl.cli.main import main
+from fracctl.execution.perform import perform
+from tests.execution.fakes import job
 
 FEW = ["figures=null", "survey=out_of_plane", "survey.axes.alpha_w=[0.91,1.0]", "survey.axes.k_p_w=[0.55,0.85]",
        "survey.axes.k_d_w=2"]  # fmt: skip
@@ -57,6 +59,26 @@ def test_stored_runs_are_not_computed_again(capsys: pytest.CaptureFixture[str]) 
     assert [record["law"] for record in found] == [f"custom/{path.name}" for path in directories]
     assert [Path(record["run_directory"]) for record in found] == directories
     assert {path.absolute() for path in Path("outputs/custom").iterdir() if path.is_dir()} == set(directories)
+
+
+def test_a_run_that_lacks_points_is_marked(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    whole = perform(job(tmp_path)).run_directory
+    lacks = perform(job(tmp_path, seed=1, faults=[{"kind": "raises", "alpha_w": 0.8}])).run_directory
+    words = ["compare", str(whole), str(lacks)]
+    said = f"error: fake/{lacks.name}: 441 points could not be computed (ValueError: the fault was asked for); "
+    assert main(words) == 1
+    captured = capsys.readouterr()
+    assert f"fake/{lacks.name}, incomplete: 441 points missing" in captured.out
+    assert f"fake/{whole.name}, " not in captured.out
+    assert captured.err.startswith(said)
+    assert main([*words, "--json"]) == 1
+    captured = capsys.readouterr()
+    found = [json.loads(line) for line in captured.out.splitlines()]
+    assert {(Path(record["run_directory"]), record["run_status"]) for record in found} == {
+        (whole, "finished"),
+        (lacks, "incomplete"),
+    }
+    assert captured.err.startswith(said)
 
 
 def _run(capsys: pytest.CaptureFixture[str], *words: str) -> Path:
