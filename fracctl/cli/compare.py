@@ -11,6 +11,7 @@ from fracctl.cli import output
 from fracctl.cli.failure import report
 from fracctl.cli.laws import law_lines
 from fracctl.cli.parser import Parser
+from fracctl.cli.run_word import names_run
 from fracctl.cli.showing import lacking
 from fracctl.errors import FracctlError, RunError, UsageError
 
@@ -73,8 +74,8 @@ def execute(options: argparse.Namespace) -> int:
 
 
 def _is_run(word: str) -> bool:
-    """Whether a word names a directory; it is one of a run, or refused."""
-    if "=" in word or not Path(word).is_dir():
+    """Whether a word names a run; other directories are refused, where no study has their name."""
+    if not names_run(word):
         return False
     if not (Path(word) / "run.json").is_file():
         raise UsageError(f"'{word}' holds no run; name directories that hold run.json ('fracctl list runs')")

@@ -10,6 +10,7 @@ import pytest
 
 import fracctl as fc
 from fracctl.cli.main import main
+from fracctl.cli.run_word import names_run
 from fracctl.execution.perform import perform
 from tests.execution.fakes import job
 
@@ -102,6 +103,19 @@ def test_two_studies(capsys: pytest.CaptureFixture[str]) -> None:
     laws = ("pd", "pd_alpha", "pd_lag", "lqr")
     assert [record["law"] for record in found] == [f"{name} {law}" for name in ("one", "two") for law in laws]
     assert found[0]["delta_v_m_s"] != found[4]["delta_v_m_s"]
+
+
+def test_a_directory_does_not_hide_the_study_of_its_name(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["init", "my_study"]) == 0
+    Path("my_study").mkdir()
+    capsys.readouterr()
+    assert main(["validate", "my_study"]) == 0
+    assert capsys.readouterr().out.startswith("valid: my_study, ")
+    assert not names_run("my_study")
+    Path("my_study/run.json").touch()
+    assert names_run("my_study")
+    assert main(["validate", "my_study"]) == 1
+    assert "holds no run: run.json is damaged" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
