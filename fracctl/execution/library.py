@@ -8,7 +8,7 @@ from pathlib import Path
 
 from fracctl.config.compose import compose
 from fracctl.config.studies import study_file
-from fracctl.errors import IncompleteRunWarning
+from fracctl.errors import ArgumentError, IncompleteRunWarning
 from fracctl.execution.run import RunResult, execute
 
 
@@ -24,9 +24,12 @@ def run(experiment: str, overrides: Sequence[str] = (), *, config_dir: str | Pat
         IncompleteRunWarning: points are missing, or a check of the result failed; `RunResult.status` says so too.
 
     Raises:
+        ArgumentError: `overrides` is one text.
         ConfigurationError: a key is unknown or a value out of range.
         RunError: the run could not be computed or stored.
     """
+    if isinstance(overrides, str):
+        raise ArgumentError("overrides", overrides, "must be a list of words", f"write ['{overrides}']")
     chosen = any(word.lstrip("+").startswith(("scheduler=", "scheduler@")) for word in overrides)
     default = [] if chosen else ["scheduler=serial"]
     chosen_run = experiment if study_file(experiment) else f"experiment={experiment}"
