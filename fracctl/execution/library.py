@@ -17,7 +17,8 @@ def run(experiment: str, overrides: Sequence[str] = (), *, config_dir: str | Pat
 
     Args:
         experiment: name, e.g. ``ic1_outofplane``, or file of a study, e.g. ``my_study.yaml``.
-        overrides: as on the command line, e.g. ``["survey.axes.alpha_w=[0.91,1.0]"]``.
+        overrides: as on the command line, e.g. ``["survey.axes.alpha_w=[0.91,1.0]"]``; here a key may stand twice, and
+            the last one counts.
         config_dir: a directory of your own configuration files.
 
     Warns:
