@@ -8,8 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fracctl.cli import output
+from fracctl.cli.failure import report
 from fracctl.cli.laws import law_lines
 from fracctl.cli.parser import Parser
+from fracctl.cli.run_word import names_run
+from fracctl.cli.showing import lacking
 from fracctl.errors import FracctlError, RunError, UsageError
 
 if TYPE_CHECKING:
@@ -30,6 +33,8 @@ _EXAMPLES = """\
   fracctl compare outputs/ic1_outofplane/*                  stored runs"""
 
 _NOT_SHOWN = ("law_number", "stable", "error_estimate", "nodes", "principal_poles", "all_poles_found")
+_RUN_STATUS = "run_status"
+_OF_RUN = ("run_directory", _RUN_STATUS)
 _RESULTS = ("optimum", "baseline")
 
 
@@ -58,16 +63,19 @@ def execute(options: argparse.Namespace) -> int:
     if options.json:
         for record in records:
             output.say_json(record)
-        return 0
-    shown = [{name: value for name, value in record.items() if name != "run_directory"} for record in records]
-    for line in law_lines(shown):
-        output.say(line)
-    return 0
+    else:
+        shown = [{name: value for name, value in record.items() if name not in _OF_RUN} for record in records]
+        for line in law_lines(shown):
+            output.say(line)
+    unsound = [(label, summary) for label, summary in summaries if summary["status"] != "finished"]
+    for label, summary in unsound:
+        report(RunError(str(summary["error"] or summary["status"])), options.debug, f"{label}: ")
+    return 1 if unsound else 0
 
 
 def _is_run(word: str) -> bool:
-    """Whether a word names a directory; it is one of a run, or refused."""
-    if "=" in word or not Path(word).is_dir():
+    """Whether a word names a run; other directories are refused, where no study has their name."""
+    if not names_run(word):
         return False
     if not (Path(word) / "run.json").is_file():
         raise UsageError(f"'{word}' holds no run; name directories that hold run.json ('fracctl list runs')")
@@ -121,25 +129,26 @@ def _computed(words: Sequence[str], options: argparse.Namespace) -> Iterator[tup
 
 
 def _records(summaries: Sequence[tuple[str, Mapping[str, Any]]]) -> Iterator[dict[str, Any]]:
-    """Yield the columns of the table: `initial_condition`, `law` (what stands above it), `run_directory`, values."""
+    """Yield the columns of the table: `initial_condition`, `law` (what stands above it), what is of the run, values."""
     alone = len(summaries) == 1
     for label, summary in summaries:
-        where = {"run_directory": summary["run_directory"]}
+        where = {"run_directory": summary["run_directory"], _RUN_STATUS: summary["status"]}
+        lacks = lacking(summary)
         laws = summary.get("tables", {}).get("laws", ())
         for row in laws:
-            head = {"initial_condition": row["initial_condition"], "law": _head(label, row["law"])}
+            head = {"initial_condition": row["initial_condition"], "law": _head(label, row["law"], lacks)}
             yield head | where | {name: value for name, value in row.items() if name not in head}
         for result in () if laws else _primary(summary):
             for kind in _RESULTS:
                 point = result[kind]
                 if point is not None and not (kind == "baseline" and point == result["optimum"]):
                     word = kind if alone or kind == "baseline" else ""
-                    head = {"initial_condition": result["initial_condition"], "law": _head(label, word)}
+                    head = {"initial_condition": result["initial_condition"], "law": _head(label, word, lacks)}
                     yield head | where | _values(point)
 
 
-def _head(label: str, word: str) -> str:
-    return " ".join(filter(None, (label, word))) or "result"
+def _head(label: str, word: str, lacks: str) -> str:
+    return (" ".join(filter(None, (label, word))) or "result") + lacks
 
 
 def _primary(summary: Mapping[str, Any]) -> list[Mapping[str, Any]]:

@@ -48,7 +48,9 @@ def execute(options: argparse.Namespace) -> int:
         return _say_finished(stored(directory).summary, options)
     config = continuation(directory, overrides)
     ended = compute_and_show(
-        Job(config), options, lambda progress: execute_run(config, directory=directory, progress=progress)
+        Job(config, directory=directory),
+        options,
+        lambda progress: execute_run(config, directory=directory, progress=progress),
     )
     return report(ended.problem, options.debug) if ended.problem else 0
 

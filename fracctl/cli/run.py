@@ -14,7 +14,7 @@ from fracctl.cli.failure import report, sentence
 from fracctl.cli.multirun import summary_lines
 from fracctl.cli.parser import Parser
 from fracctl.cli.showing import Ended, Job, add_display_options, compute_and_show
-from fracctl.errors import ConfigurationError, RunError
+from fracctl.errors import ConfigurationError, RunError, UsageError
 
 if TYPE_CHECKING:
     from fracctl.execution.executors import Executors
@@ -46,7 +46,10 @@ def parser() -> Parser:
     parser.add_overrides()
     parser.add_argument("-m", "--multirun", action="store_true", help="one run for each of the values key=a,b,c")
     parser.add_argument(
-        "--cfg", choices=["job"], metavar="job", help="'--cfg job' prints the resolved configuration and exits"
+        "--cfg",
+        choices=["job"],
+        metavar="job",
+        help="'--cfg job' prints the resolved configuration, with --json as JSON",
     )
     parser.add_config_dir()
     parser.add_argument("--fresh", action="store_true", help="compute again what is stored already")
@@ -57,11 +60,11 @@ def parser() -> Parser:
 
 def execute(options: argparse.Namespace) -> int:
     """Do what the command line asks for and return the exit code."""
+    if options.fail_fast and not options.multirun:
+        raise UsageError("--fail-fast goes with -m, for a single run has none after it")
     jobs = _jobs(options)
     if options.cfg:
-        from fracctl.config.compose import to_yaml
-
-        output.say("---\n".join(to_yaml(job.config) for job in jobs).rstrip())
+        _print_configurations(jobs, options)
         return 0
     from fracctl.execution.executors import Executors
 
@@ -70,6 +73,16 @@ def execute(options: argparse.Namespace) -> int:
             return _sweep(jobs, options, executors)
         problem = _run(jobs[0], options, executors).problem
     return report(problem, options.debug) if problem else 0
+
+
+def _print_configurations(jobs: Sequence[Job], options: argparse.Namespace) -> None:
+    from fracctl.config.compose import to_yaml
+
+    if options.json:
+        for job in jobs:
+            output.say_json(job.config.model_dump(mode="json"))
+    else:
+        output.say("---\n".join(to_yaml(job.config) for job in jobs).rstrip())
 
 
 def _run(job: Job, options: argparse.Namespace, executors: Executors) -> Ended:

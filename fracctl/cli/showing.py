@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from fracctl.config.schemas import RunConfig
     from fracctl.execution.perform import RunResult
     from fracctl.execution.progress import Progress
+    from fracctl.store import RunDirectory
     from fracctl.units import Scales
 
 MOST_DESIGN_VARIABLES = 10
@@ -47,6 +48,8 @@ class Job:
     """Of the plant."""
     further: Mapping[str, Any] = field(default_factory=dict)
     """What its line of JSON holds beside the summary."""
+    directory: RunDirectory | None = None
+    """Where it is stored; None for where its configuration says."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +77,7 @@ def compute_and_show(job: Job, options: argparse.Namespace, compute: Callable[[P
         summary = compute(progress).summary
     except Exception as error:  # noqa: BLE001 - the other runs go on
         if options.json:
-            output.say_json({**_failure(job.config, error), **job.further})
+            output.say_json({**_failure(job, error), **job.further})
         return Ended(None, error)
     _show(summary, job, options)
     return Ended(summary, FracctlError(str(summary["error"])) if summary.get("error") else None)
@@ -122,7 +125,14 @@ def _table(config: RunConfig) -> ResultTable:
     return ResultTable(config.objectives, hidden, "result" if survey["type"] in ("single", "lqr_seed") else "optimum")
 
 
-def _failure(config: RunConfig, error: Exception) -> dict[str, Any]:
-    """The JSON of a run that gave no result."""
-    found = {"experiment": config.name, "status": "failed", "reused": False, "error": sentence(error)}
+def _failure(job: Job, error: Exception) -> dict[str, Any]:
+    """The JSON of a run that gave no result; its directory, where there is one, holds what was computed and the log."""
+    from fracctl.store import directory_of
+    from fracctl.store.identity import run_id
+
+    plain = job.config.model_dump(mode="json")
+    directory = job.directory or directory_of(plain)
+    stored = str(directory.path) if directory.path.is_dir() else None
+    found: dict[str, Any] = {"experiment": job.config.name, "run_id": run_id(plain), "run_directory": stored}
+    found |= {"status": "failed", "reused": False, "error": sentence(error)}
     return {key: found.get(key) for key in _KEYS}

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from fracctl.cli import output
 from fracctl.cli.parser import Parser
+from fracctl.cli.run_word import names_run
 from fracctl.errors import ConfigurationError, RunError
 from fracctl.report.numbers import count
 
@@ -42,7 +43,7 @@ def parser() -> Parser:
 def execute(options: argparse.Namespace) -> int:
     """Do what the command line asks for and return the exit code."""
     words: list[str] = options.overrides
-    stored = len(words) == 1 and "=" not in words[0] and Path(words[0]).is_dir()
+    stored = len(words) == 1 and names_run(words[0])
     try:
         found, sentence = _run(Path(words[0])) if stored else _configuration(words, options.config_dir)
     except (ConfigurationError, RunError) as error:

@@ -71,7 +71,8 @@ class ComparedLaws(Evaluation):
 
     def __post_init__(self) -> None:
         if self.plant.scales is None:
-            raise ArgumentError("plant", self.plant.components, "must have scales, for limits are in SI units")
+            instead = "set plant.scales, or take plant=hcw"
+            raise ArgumentError("plant", type(self.plant).__name__, "must have units, for limits are in SI", instead)
         if self.reference not in self.laws:
             allowed = f"must be one of the laws ({', '.join(self.laws)}){suggestion(self.reference, self.laws)}"
             raise ArgumentError("reference", self.reference, allowed)

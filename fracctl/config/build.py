@@ -30,6 +30,8 @@ from fracctl.surveys import Grid, Single, Survey, axis_values
 _TRAJECTORIES = {"delayed": "StepwiseTrajectory", "memory": "MeshTrajectory"}
 _OF_LOOPS = ("performance", "robust")
 """Evaluations that measure loops and keep to constraints."""
+_OPTIMISING = ("search", "pattern_search", "continuation")
+"""Surveys that look for the best point."""
 _OWN_SOLVERS = {"delayed": "method_of_steps", "memory": "implicit_memory"}
 
 
@@ -169,18 +171,34 @@ def build_survey(config: RunConfig, evaluation: Evaluation) -> Survey:
         return Single({name: parameters[name] for name in evaluation.design_variables})
     if isinstance(survey, SingleSurvey | GridSurvey):
         grid = survey if isinstance(survey, GridSurvey) else GridSurvey(type="grid", axes={})
-        if grid.axes and getattr(config.evaluation, "laws", None):
-            cure = f"survey one with evaluation={config.evaluation.type}, whose law is the controller"
-            raise ConfigurationError(f"survey.axes: several laws have their own values (evaluation.laws); {cure}")
+        if grid.axes:
+            _refuse_several_laws(config, "survey.axes")
         axes = {name: axis_values(spec, name) for name, spec in grid.axes.items()} | dict(evaluation.axes)
         fixed = {name: parameters[name] for name in evaluation.design_variables if name not in axes}
         return Grid(axes, grid.slice or evaluation.sliced_by, grid.baseline, fixed)
+    if survey.type in _OPTIMISING:
+        _check_optimisable(config, evaluation)
     factory = registry.load("surveys", survey.type)
     try:
         built: Survey = construct(factory, survey, evaluation=evaluation, seed=config.seed)
     except ValidationError as error:
         raise InvalidConfiguration(problems(refuse(*lines_of(error, ("survey",))))) from error
     return built
+
+
+def _check_optimisable(config: RunConfig, evaluation: Evaluation) -> None:
+    place = f"survey.type = {config.survey.type}"
+    if not evaluation.objectives:
+        cure = "take survey=single, or an evaluation with objectives (performance, robust)"
+        nothing = f"optimises an objective, but evaluation.type = {config.evaluation.type} has none"
+        raise ConfigurationError(f"{place}: {nothing}; {cure}")
+    _refuse_several_laws(config, place)
+
+
+def _refuse_several_laws(config: RunConfig, place: str) -> None:
+    if getattr(config.evaluation, "laws", None):
+        cure = f"survey one with evaluation={config.evaluation.type}, whose law is the controller"
+        raise ConfigurationError(f"{place}: several laws have their own values (evaluation.laws); {cure}")
 
 
 def build_checked(config: RunConfig) -> tuple[Evaluation, Survey]:
@@ -205,7 +223,8 @@ def _check_loops(config: RunConfig, evaluation: Evaluation) -> None:
             refused = evaluation.solver.supports(evaluation.loop({LAW_NUMBER: float(number)} if laws else {}))
         except ArgumentError as error:
             place = f"evaluation.laws.{name}.values" if laws else "controller"
-            raise ConfigurationError(f"{place}.{error.name} = {error.value}: {error.allowed}") from error
+            cure = f"; {error.instead}" if error.instead else ""
+            raise ConfigurationError(f"{place}.{error.name} = {error.value}: {error.allowed}{cure}") from error
         if refused is not None:
             place = f"evaluation.laws.{name}.type" if laws else f"solver.type = {config.solver.type}"
             raise ConfigurationError(f"{place}: {refused}")

@@ -196,8 +196,9 @@ def _parse(text: str, loader: ConfigLoader, found: Catalogue) -> Override:
     if "=" not in text and not text.startswith("~"):
         near = suggestion(text, studies_here())
         hint = near or suggestion(text, found.options("experiment")).replace("'", "'experiment=", 1)
-        name = f"{text.removesuffix('.yaml')}.yaml"
-        raise UsageError(f"'{text}' is neither an override, KEY=VALUE, nor a study, for there is no {name}{hint}")
+        name = text.removesuffix(".yaml")
+        cure = hint or f"; 'fracctl init {name}' writes one, 'fracctl list experiments' names what there is"
+        raise UsageError(f"'{text}' is neither an override, KEY=VALUE, nor a study, for there is no {name}.yaml{cure}")
     try:
         parsed = OverridesParser.create().parse_override(text)
         parsed.config_loader = loader  # for glob(…)

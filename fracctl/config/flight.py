@@ -96,7 +96,9 @@ def surroundings(config: RunConfig, given: FlightEvaluation, plant: Any) -> Surr
 
     scales, craft, thrusters = plant.scales, spacecraft(config), given.thrusters
     if scales is None:
-        raise ArgumentError("plant", plant, "must have units for flights; set plant.scales")
+        raise ArgumentError(
+            "plant", type(plant).__name__, "must have units for flights", "set plant.scales, or take plant=hcw"
+        )
     if thrusters.impulse_bit_n_s and craft.mass_kg is None:
         where = f"evaluation.thrusters.impulse_bit_n_s = {thrusters.impulse_bit_n_s:g}"
         raise ConfigurationError(f"{where}: needs a mass; set spacecraft.mass_kg")

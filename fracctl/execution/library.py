@@ -9,7 +9,7 @@ from pathlib import Path
 from fracctl.config.command import Command
 from fracctl.config.compose import compose
 from fracctl.config.studies import study_file
-from fracctl.errors import IncompleteRunWarning
+from fracctl.errors import ArgumentError, IncompleteRunWarning
 from fracctl.execution.run import RunResult, execute
 
 
@@ -18,16 +18,20 @@ def run(experiment: str, overrides: Sequence[str] = (), *, config_dir: str | Pat
 
     Args:
         experiment: name, e.g. ``ic1_outofplane``, or file of a study, e.g. ``my_study.yaml``.
-        overrides: as on the command line, e.g. ``["survey.axes.alpha_w=[0.91,1.0]"]``.
+        overrides: as on the command line, e.g. ``["survey.axes.alpha_w=[0.91,1.0]"]``; here a key may stand twice, and
+            the last one counts.
         config_dir: a directory of your own configuration files.
 
     Warns:
         IncompleteRunWarning: points are missing, or a check of the result failed; `RunResult.status` says so too.
 
     Raises:
+        ArgumentError: `overrides` is one text.
         ConfigurationError: a key is unknown or a value out of range.
         RunError: the run could not be computed or stored.
     """
+    if isinstance(overrides, str):
+        raise ArgumentError("overrides", overrides, "must be a list of words", f"write ['{overrides}']")
     chosen = any(word.lstrip("+").startswith(("scheduler=", "scheduler@")) for word in overrides)
     default = [] if chosen else ["scheduler=serial"]
     chosen_run = experiment if study_file(experiment) else f"experiment={experiment}"

@@ -68,7 +68,9 @@ class FlightEvaluation(Evaluation):
 
     def __post_init__(self) -> None:
         if self.plant.scales is None:
-            raise ArgumentError("plant", self.plant, "must have units for flights; set plant.scales")
+            raise ArgumentError(
+                "plant", type(self.plant).__name__, "must have units for flights", "set plant.scales, or take plant=hcw"
+            )
         check_laws(self.laws, self.plant.components)
         for stage in self.stages:
             if stage not in STAGES:

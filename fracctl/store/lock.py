@@ -6,6 +6,7 @@ import errno
 import fcntl
 import logging
 import os
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -14,6 +15,8 @@ from fracctl.errors import RunError
 from fracctl.store.files import disk_errors
 
 _UNSUPPORTED = {errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP}
+
+_INSTANT_S = 0.2
 
 _log = logging.getLogger(__name__)
 
@@ -36,6 +39,8 @@ def exclusive(path: Path) -> Iterator[None]:
 
 
 def _acquire(path: Path) -> int:
+    """Return the descriptor of the locked file; `holder` has it for an instant, which is waited for."""
+    patience = time.monotonic() + _INSTANT_S
     while True:
         descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
         try:
@@ -43,6 +48,9 @@ def _acquire(path: Path) -> int:
         except BlockingIOError:
             other = _written_in(descriptor)
             os.close(descriptor)
+            if time.monotonic() < patience:
+                time.sleep(_INSTANT_S / 20.0)
+                continue
             raise RunError(f"another process ({other}) is computing this run; its lock is {path}") from None
         except OSError as problem:
             if problem.errno not in _UNSUPPORTED:

@@ -10,6 +10,9 @@ import pytest
 
 import fracctl as fc
 from fracctl.cli.main import main
+from fracctl.cli.run_word import names_run
+from fracctl.execution.perform import perform
+from tests.execution.fakes import job
 
 FEW = ["figures=null", "survey=out_of_plane", "survey.axes.alpha_w=[0.91,1.0]", "survey.axes.k_p_w=[0.55,0.85]",
        "survey.axes.k_d_w=2"]  # fmt: skip
@@ -59,6 +62,26 @@ def test_stored_runs_are_not_computed_again(capsys: pytest.CaptureFixture[str]) 
     assert {path.absolute() for path in Path("outputs/custom").iterdir() if path.is_dir()} == set(directories)
 
 
+def test_a_run_that_lacks_points_is_marked(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    whole = perform(job(tmp_path)).run_directory
+    lacks = perform(job(tmp_path, seed=1, faults=[{"kind": "raises", "alpha_w": 0.8}])).run_directory
+    words = ["compare", str(whole), str(lacks)]
+    said = f"error: fake/{lacks.name}: 441 points could not be computed (ValueError: the fault was asked for); "
+    assert main(words) == 1
+    captured = capsys.readouterr()
+    assert f"fake/{lacks.name}, incomplete: 441 points missing" in captured.out
+    assert f"fake/{whole.name}, " not in captured.out
+    assert captured.err.startswith(said)
+    assert main([*words, "--json"]) == 1
+    captured = capsys.readouterr()
+    found = [json.loads(line) for line in captured.out.splitlines()]
+    assert {(Path(record["run_directory"]), record["run_status"]) for record in found} == {
+        (whole, "finished"),
+        (lacks, "incomplete"),
+    }
+    assert captured.err.startswith(said)
+
+
 def _run(capsys: pytest.CaptureFixture[str], *words: str) -> Path:
     assert main(["run", *words]) == 0
     return Path(capsys.readouterr().out.splitlines()[-1])
@@ -80,6 +103,19 @@ def test_two_studies(capsys: pytest.CaptureFixture[str]) -> None:
     laws = ("pd", "pd_alpha", "pd_lag", "lqr")
     assert [record["law"] for record in found] == [f"{name} {law}" for name in ("one", "two") for law in laws]
     assert found[0]["delta_v_m_s"] != found[4]["delta_v_m_s"]
+
+
+def test_a_directory_does_not_hide_the_study_of_its_name(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["init", "my_study"]) == 0
+    Path("my_study").mkdir()
+    capsys.readouterr()
+    assert main(["validate", "my_study"]) == 0
+    assert capsys.readouterr().out.startswith("valid: my_study, ")
+    assert not names_run("my_study")
+    Path("my_study/run.json").touch()
+    assert names_run("my_study")
+    assert main(["validate", "my_study"]) == 1
+    assert "holds no run: run.json is damaged" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -12,8 +12,10 @@ from typing import Any
 import pytest
 
 from fracctl.cli.main import main
+from fracctl.config.compose import compose
 from fracctl.config.schemas import RunConfig
 from fracctl.errors import RunError
+from fracctl.store.identity import run_id
 
 POINT = {"initial_condition": "ic1", "alpha_w": 0.91, "k_p_w": 0.85, "k_d_w": 2.0, "settling_time": 3.01276,
          "overshoot": 7.7874, "control_effort": 2.638e-3, "objective": 3.01276, "objective_settling_time": 3.01276,
@@ -247,10 +249,27 @@ def test_a_failed_run_has_its_line_of_json(capsys: pytest.CaptureFixture[str], s
     assert main(["run", "controller.alpha_w=0.9", "--json"]) == 1
     captured = capsys.readouterr()
     (line,) = captured.out.splitlines()
+    expected = run_id(compose(["controller.alpha_w=0.9"]).model_dump(mode="json"))
     assert json.loads(line) == dict.fromkeys(summary("")) | {
-        "experiment": "custom", "status": "failed", "reused": False, "error": "the disk is full"
+        "experiment": "custom", "run_id": expected, "status": "failed", "reused": False, "error": "the disk is full"
     }  # fmt: skip
     assert captured.err == "error: the disk is full\n"
+    folder = Path("outputs/custom") / expected
+    folder.mkdir(parents=True)
+    assert main(["run", "controller.alpha_w=0.9", "--json"]) == 1
+    assert json.loads(capsys.readouterr().out)["run_directory"] == str(folder.absolute())
+
+
+def test_fail_fast_goes_with_several_runs(capsys: pytest.CaptureFixture[str], stand_in: StandIn) -> None:
+    assert main(["run", "--fail-fast"]) == 2
+    assert capsys.readouterr().err.startswith("error: --fail-fast goes with -m")
+    assert stand_in.calls == []
+
+
+def test_configurations_as_json(capsys: pytest.CaptureFixture[str], stand_in: StandIn) -> None:
+    assert main(["run", "-m", "seed=1,2", "--cfg=job", "--json"]) == 0
+    found = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert found == [compose([f"seed={seed}"]).model_dump(mode="json") for seed in (1, 2)]
 
 
 def test_an_incomplete_run_shows_what_it_has_and_fails(capsys: pytest.CaptureFixture[str], stand_in: StandIn) -> None:

@@ -10,7 +10,7 @@ import pytest
 from fracctl.config.build import build_checked, build_evaluation, build_survey
 from fracctl.config.compose import compose
 from fracctl.config.schemas import RunConfig
-from fracctl.errors import ConfigurationError
+from fracctl.errors import ArgumentError, ConfigurationError
 from fracctl.plants import Chief
 
 
@@ -84,3 +84,35 @@ def test_a_loop_that_the_solver_does_not_take(monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setattr("fracctl.solvers.Contour.supports", lambda self, loop: "linear loops only; use 'other'")
     with pytest.raises(ConfigurationError, match="contour: linear loops only; use 'other'"):
         build_checked(build())
+
+
+def test_the_cure_of_a_loop_that_cannot_be_built_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(self: object, loop: object) -> None:
+        raise ArgumentError("k_p_w", 9.0, "must be below 5", "take a gain of 4")
+
+    monkeypatch.setattr("fracctl.solvers.Contour.supports", refuse)
+    with pytest.raises(ConfigurationError, match=r"^controller.k_p_w = 9.0: must be below 5; take a gain of 4$"):
+        build_checked(build())
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["experiment=flight_ic1", "survey=search"], "survey.type = search: optimises an objective, but evaluation"),
+        (["experiment=tether", "survey=search"], "survey.type = search: several laws have their own values"),
+        (
+            ["experiment=fair_outofplane", "plant=linear", "plant.components=[w]", "initial_condition=own",
+             "initial_condition.own.w=1"],
+            "plant = LinearPlant: must have units, for limits are in SI; set plant.scales, or take plant=hcw",
+        ),
+        (
+            ["evaluation=flight", "measures=standard", "plant=linear", "plant.components=[w]", "initial_condition=own",
+             "initial_condition.own.w=1", "figures=null"],
+            "; set plant.scales",
+        ),
+    ],
+)  # fmt: skip
+def test_what_does_not_go_together_is_told_with_its_cure(words: list[str], said: str) -> None:
+    with pytest.raises(ConfigurationError) as refused:
+        build_checked(build(*words))
+    assert said in str(refused.value)

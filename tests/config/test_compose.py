@@ -128,6 +128,7 @@ def test_what_hydra_would_take_silently_or_say_obscurely(words: list[str], said:
         ("survey.axes.alpha_w=0.9,1.0", "a list is written 'survey.axes.alpha_w=[0.9,1.0]'"),
         ("ic1_outofplane", "did you mean 'experiment=ic1_outofplane'?"),
         ("foo", "neither an override, KEY=VALUE"),
+        ("foo.yaml", "no foo.yaml; 'fracctl init foo' writes one, 'fracctl list experiments' names what there is"),
         ("=1", "write KEY=VALUE"),
         ("~seed=77", "a key is removed whatever its value; write '~seed', or 'seed=77' to set it"),
         ("name='a", "cannot read"),

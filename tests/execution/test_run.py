@@ -12,7 +12,7 @@ import pytest
 
 import fracctl
 from fracctl.config.compose import compose
-from fracctl.errors import RunError
+from fracctl.errors import ArgumentError, RunError
 from fracctl.execution.run import RunResult, execute
 from fracctl.store import RunDirectory
 from tests.execution.test_perform import tables_of
@@ -74,6 +74,11 @@ def test_overrides_may_choose_the_scheduler(tmp_path: Path) -> None:
     words = [*axes, "figures=[]", f"output_dir={tmp_path}", "scheduler=local", "scheduler.workers=2"]
     run = RunDirectory(fracctl.run("ic1_outofplane", words).run_directory)
     assert run.run_json["configuration"]["scheduler"] == {"type": "local", "workers": 2, "time_limit": None}
+
+
+def test_one_text_is_no_list_of_overrides() -> None:
+    with pytest.raises(ArgumentError, match=r"`overrides` must be a list of words, but is .*; write \['seed=1'\]"):
+        fracctl.run("ic1_outofplane", "seed=1")
 
 
 def test_trajectories_are_those_of_the_optima(result: RunResult) -> None:
