@@ -14,6 +14,7 @@ from fracctl.dispersions import SAMPLE
 from fracctl.errors import ArgumentError, UnsupportedError, suggestion
 from fracctl.evaluation import COUNTERS, LAW_NUMBER, Conclusion, Evaluation
 from fracctl.flight import beside, conclusion
+from fracctl.flight.implementations import IMPLEMENTATIONS, Implementations
 from fracctl.flight.measured import measured, names, takes
 from fracctl.flight.names import CERTAIN, STAGES, Stage
 from fracctl.flight.stages import Flown, Sampling, Surroundings
@@ -261,6 +262,9 @@ class FlightEvaluation(Evaluation):
         varied = [name for name in self.design_variables if name != LAW_NUMBER and np.unique(rows[name]).size > 1]
         groups = ["initial_condition", *([LAW] if self.laws else varied)]
         found = conclusion.conclude(rows, groups, self.measured_columns, self.bands_m)
+        if not varied and np.isin(rows[STAGE], CERTAIN).any():
+            laws = Implementations(self.loop, self.sampling, self.around.navigation)
+            found = found.beside(IMPLEMENTATIONS, list(laws.records(rows, self.measured_columns)))
         return self._beside(rows, found) if self.laws and len(self.flights) == len(self.stages) else found
 
     def _beside(self, rows: Mapping[str, Array], found: Conclusion) -> Conclusion:
