@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Protocol
 
@@ -57,6 +57,10 @@ class Conclusion:
     """Sentences for the summary."""
     best: tuple[Mapping[str, Any], ...] = ()
     """Rows that are solved again by the second solver."""
+
+    def beside(self, name: str, records: Sequence[Mapping[str, Any]]) -> Conclusion:
+        """Return the same with one more table, that is shown too."""
+        return replace(self, tables={**self.tables, name: records}, shown={**self.shown, name: records})
 
 
 @dataclass(frozen=True)

@@ -78,6 +78,45 @@ def survival_lines(records: Sequence[Record]) -> list[str]:
     return lines
 
 
+def implementation_lines(records: Sequence[Record]) -> list[str]:
+    """Return a part with a row for each law on board: its margins, its size, and what noise keeps up."""
+    first = records[0]["initial_condition"] if records else None
+    own = [record for record in records if (record["initial_condition"], record["stage"]) == (first, "sampled")]
+    if not own:
+        return []
+    names = [name for name in _ON_BOARD if name in own[0]]
+    ideal = {_name(r): r for r in records if (r["initial_condition"], r["stage"]) == (first, "ideal")}
+    rows = [["on board", *(_ON_BOARD[name] for name in names)]]
+    for record in own:
+        designed = ideal.get(_name(record), {})
+        cells = [_short(record[name]) for name in names]
+        before = [_short(designed.get(name)) if name in _DESIGNED else "" for name in names]
+        rows.append([_name(record), *(f"{c} ({b})" if b else c for c, b in zip(cells, before, strict=True))])
+    return table(rows)
+
+
+def _name(record: Record) -> str:
+    return str(record.get("law", "the law"))
+
+
+def _short(value: Any) -> str:
+    return "" if value is None else number(value, 3)
+
+
+_DESIGNED = ("phase_margin_deg", "gain_margin_db", "sensitivity_peak", "disk_margin")
+_ON_BOARD = {
+    "phase_margin_deg": "phase, deg (ideal)",
+    "gain_margin_db": "gain, dB (ideal)",
+    "sensitivity_peak": "M_s (ideal)",
+    "disk_margin": "disk margin (ideal)",
+    "states": "states",
+    "operations": "operations",
+    "noise_position_m": "noise, m",
+    "noise_control_mm_s2": "noise, mm/s²",
+}
+"""What is told of laws on board, by the columns of the table."""
+
+
 _TAKEN = {
     "quantile_95_orbits": "interval of 95 %",
     "settled_percent": "% settled",

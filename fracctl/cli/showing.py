@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from fracctl.cli import output
 from fracctl.cli.comparison import comparison_lines
 from fracctl.cli.failure import sentence
-from fracctl.cli.laws import law_lines, quantile_lines, survival_lines
+from fracctl.cli.laws import implementation_lines, law_lines, quantile_lines, survival_lines
 from fracctl.cli.parser import Parser
 from fracctl.cli.progress import display
 from fracctl.cli.table import ResultTable
@@ -111,7 +111,7 @@ def _lines(summary: dict[str, Any], config: RunConfig) -> list[str]:
     if "laws" in tables:
         return law_lines(tables["laws"]) + survival_lines(tables.get("survival", []))
     if "survival" in tables:
-        return survival_lines(tables["survival"])
+        return survival_lines(tables["survival"]) + implementation_lines(tables.get("implementations", []))
     if "quantiles" in tables:
         return quantile_lines(tables["quantiles"])
     return _table(config).lines(summary)

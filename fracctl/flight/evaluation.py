@@ -15,6 +15,7 @@ from fracctl.errors import ArgumentError, UnsupportedError, suggestion
 from fracctl.evaluation import COUNTERS, LAW_NUMBER, Conclusion, Evaluation
 from fracctl.flight import conclusion, single_flights, uncertain
 from fracctl.flight import rows as rows_of
+from fracctl.flight.implementations import IMPLEMENTATIONS, Implementations
 from fracctl.flight.measured import names, takes
 from fracctl.flight.stage_names import CERTAIN, STAGES, Stage
 from fracctl.flight.stages import Flown, Sampling, Surroundings
@@ -237,6 +238,9 @@ class FlightEvaluation(Evaluation):
         varied = [name for name in self.design_variables if name != LAW_NUMBER and np.unique(rows[name]).size > 1]
         groups = ["initial_condition", *([LAW] if self.laws else varied)]
         found = conclusion.conclude(rows, groups, self.measured_columns, self.bands_m)
+        if not varied and np.isin(rows[STAGE], CERTAIN).any():
+            laws = Implementations(self.loop, self.sampling, self.around.navigation)
+            found = found.beside(IMPLEMENTATIONS, list(laws.records(rows, self.measured_columns)))
         alone = [stage for stage, _ in self.flights].count(self.stages[-1]) == 1
         return self._with_paths(rows, found) if self.laws and alone else found
 

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from fracctl.arrays import Floats, positive
+from fracctl.errors import ArgumentError
 from fracctl.loop import ClosedLoop
 from fracctl.stability import margins, noise_gain
 from fracctl.stability.noise import SAMPLE_PERIOD
@@ -53,18 +56,37 @@ class NoiseGain:
     See `fracctl.stability.noise_gain`. NaN for a loop that is not stable.
 
     Args:
-        sample_period: T_s > 0, dimensionless; the default is 10 s for a chief at 10 000 km.
+        sample_period: T_s > 0, dimensionless; 10 s for a chief at 10 000 km where neither is given.
+        sample_period_s: T_s in seconds, for plants with scales.
 
     Raises:
-        ArgumentError: T_s is not positive.
+        ArgumentError: T_s is not positive, or given twice.
     """
 
     name = "noise_gain"
     columns = ("noise_gain",)
 
-    def __init__(self, sample_period: float = SAMPLE_PERIOD) -> None:
-        self.sample_period = positive("sample_period", sample_period)
+    def __init__(self, sample_period: float | None = None, sample_period_s: float | None = None) -> None:
+        for name, value in (("sample_period", sample_period), ("sample_period_s", sample_period_s)):
+            if value is not None:
+                positive(name, value)
+        if sample_period is not None and sample_period_s is not None:
+            raise ArgumentError("sample_period_s", sample_period_s, "must not be given beside sample_period")
+        self.sample_period, self.sample_period_s = sample_period, sample_period_s
+
+    def for_flight(self, plant: Any, craft: Any = None) -> NoiseGain:  # noqa: ARG002 - as measures with units have it
+        """Return the measure with its period in the unit of a plant.
+
+        Raises:
+            ArgumentError: the period is in seconds, and the plant has no units.
+        """
+        if self.sample_period_s is None:
+            return self
+        if plant.scales is None:
+            raise ArgumentError("sample_period_s", self.sample_period_s, "needs a plant with units; give sample_period")
+        return NoiseGain(self.sample_period_s / plant.scales.time_s)
 
     def of_loop(self, loop: ClosedLoop) -> dict[str, Floats]:
         """Return column ``noise_gain``, (b,)."""
-        return {self.name: np.atleast_1d(noise_gain(loop, self.sample_period))}
+        period = self.for_flight(loop.plant).sample_period
+        return {self.name: np.atleast_1d(noise_gain(loop, SAMPLE_PERIOD if period is None else period))}

@@ -35,6 +35,7 @@ CAPTIONS = {
     LAWS: "The laws side by side",
     "comparison": "Every law at its best, by start, limit and band",
     "survival": "What survives: settling of each law, stage by stage",
+    "implementations": "Laws as designed and as they run on board",
     "quantiles": "Quantiles over dispersed runs, with intervals of 95 % confidence",
 }
 

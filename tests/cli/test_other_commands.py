@@ -123,7 +123,7 @@ def test_show_says_what_optima_must_keep_to(capsys: pytest.CaptureFixture[str]) 
     text = "\n".join(lines(capsys, "show", "experiment=ic1_margins", *limits))
     for part in (
         "stability_margins: Gain, phase and delay that bring a pole to the imaginary axis",
-        "noise_gain, sample_period 0.006313",
+        "noise_gain, sample_period_s 10",
         "optima have  phase_margin_deg >= 60\n",
         "noise_gain <= 400\n",
     ):

@@ -13,11 +13,20 @@ from fracctl.config.compose import compose
 from fracctl.errors import ArgumentError, ConfigurationError
 from fracctl.execution.run import execute
 from fracctl.flight import FlightEvaluation
+from fracctl.flight.implementations import Implementations
 from fracctl.measures import settling_time
 from fracctl.measures.settling_times import SettlingTimes
 from fracctl.plants import HCW
 from fracctl.plants.relative_motion import RelativeMotion
-from fracctl.sampled import SampledLaw, delta_v, dimensionless_time, memory_for, settling_times, simulate
+from fracctl.sampled import (
+    SampledLaw,
+    delta_v,
+    dimensionless_time,
+    memory_for,
+    sampled_margins,
+    settling_times,
+    simulate,
+)
 
 SMALL = [
     *("experiment=flight_ic1", "horizon_periods=1.5", "evaluation.samples=3", "evaluation.first_sample=0"),
@@ -209,6 +218,37 @@ def test_what_is_told_of_laws_that_never_settle(evaluation: FlightEvaluation, ro
     never["settling_time_100_m_orbits"] = np.full(there.sum(), np.inf)
     (note,) = evaluation.conclude([never]).notes
     assert note == "ic1 to 100 m, no law settles ideal; no law settles dispersed in 95 % of 3 flights"
+
+
+def test_laws_as_designed_and_on_board(evaluation: FlightEvaluation, rows: dict[str, np.ndarray]) -> None:
+    records = evaluation.conclude([rows]).tables["implementations"]
+    assert len(records) == 3 * 6 * 2
+    table = {(r["initial_condition"], r["law"], r["stage"]): r for r in records}
+    for name in ("published_pd_alpha", "pd_lag"):
+        ideal, sampled = (table["ic1_tenth", name, stage] for stage in ("ideal", "sampled"))
+        loop = fc.ClosedLoop(evaluation.plant, published(name, evaluation))
+        controller = evaluation.sampling.law(loop).discrete(3)
+        assert ideal["sensitivity_peak"] == pytest.approx(fc.stability.margins(loop).sensitivity_peak)
+        assert sampled["disk_margin"] == pytest.approx(sampled_margins(evaluation.plant, controller).disk_margin)
+        assert sampled["sensitivity_peak"] > ideal["sensitivity_peak"], "samples and delay take from the margins"
+        assert (sampled["states"], np.isnan(ideal["states"])) == (controller.n_states, True)
+        flown = of(rows, name, "sampled", "ic1_tenth")
+        assert sampled["settling_time_10_m_orbits"] == flown["settling_time_10_m_orbits"][0]
+        assert sampled["delta_v_m_s"] == flown["delta_v_m_s"][0]
+    quiet, loud = (table["ic1", name, "sampled"]["noise_control_mm_s2"] for name in ("pd_lag", "pd"))
+    assert 0.0 < quiet < 0.2 * loud
+
+
+def test_noise_on_board_is_that_of_a_long_flight() -> None:
+    flights = built([*ONE, "horizon_periods=12", "evaluation.delay=0", "evaluation.largest_by=axis"])
+    laws = Implementations(flights.loop, flights.sampling, flights.around.navigation)
+    known = laws._of_law(0.0, "sampled")
+    controller = flights.sampling.law(flights.loop({})).discrete(3)
+    flown = simulate(HCW(), controller, np.zeros((8, 6)), flights.horizon, navigation=flights.around.navigation)
+    late = flown.at_samples[:, 400:, :3] * HCW().scales.length_m
+    spent = 1e3 * HCW().scales.acceleration_m_s2 * flown.commands[:, 400:]
+    assert known["noise_position_m"] == pytest.approx(np.sqrt((late**2).mean(axis=(0, 1))).max(), rel=0.15)
+    assert known["noise_control_mm_s2"] == pytest.approx(np.sqrt((spent**2).mean(axis=(0, 1))).max(), rel=0.05)
 
 
 def test_the_table_is_that_of_any_number_of_workers(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from fracctl.evaluation import Evaluation
 from fracctl.loop import ClosedLoop
 from fracctl.measures import LoopMeasure, NoiseGain, Sensitivity, SettlingTime, StabilityMargins
 from fracctl.measures.base import trajectories_of
-from fracctl.plants import HCWOutOfPlane
+from fracctl.plants import Chief, HCWOutOfPlane, LinearPlant
 from fracctl.solvers import Contour
 from fracctl.stability import margins, noise_gain
 from fracctl.store.columns import unit
@@ -60,7 +60,20 @@ def test_what_a_measure_of_loops_is() -> None:
     assert all(isinstance(measure, LoopMeasure) for measure in MEASURES)
     assert not isinstance(SettlingTime(), LoopMeasure)
     assert trajectories_of(StabilityMargins) == "Trajectory"
+    with pytest.raises(ArgumentError, match="must not be given beside sample_period"):
+        NoiseGain(0.01, 10.0)
+    with pytest.raises(ArgumentError, match="`sample_period_s` needs a plant with units"):
+        NoiseGain(sample_period_s=10.0).for_flight(LinearPlant(-1.0))
     with pytest.raises(ArgumentError, match="sample_period"):
         NoiseGain(-1.0)
     with pytest.raises(ArgumentError, match="constraints"):
         replace(evaluation(), constraints={"phase": None})  # type: ignore[dict-item]
+
+
+def test_a_period_in_seconds_is_that_of_the_chief() -> None:
+    plant = HCWOutOfPlane(Chief(altitude_km=500.0))
+    loop = ClosedLoop(plant, PDAlpha(0.85, 2.0, 0.91))
+    assert plant.scales is not None
+    expected = noise_gain(loop, 10.0 / plant.scales.time_s)
+    assert NoiseGain(sample_period_s=10.0).of_loop(loop)["noise_gain"] == pytest.approx(expected, rel=1e-12)
+    assert NoiseGain().of_loop(loop)["noise_gain"] != pytest.approx(expected, rel=0.01)
