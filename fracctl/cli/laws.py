@@ -142,7 +142,7 @@ def _taken(name: str, record: Record) -> str:
     """A number, with its interval where it has one."""
     if name == "quantile_95_orbits":
         low, high = (record[f"quantile_95_{end}_orbits"] for end in ("low", "high"))
-        return f"[{'-∞' if low is None else f'{low:.3f}'}, {'∞' if high is None else f'{high:.3f}'}]"
+        return "never" if low is None else f"[{low:.3f}, {'∞' if high is None else f'{high:.3f}'}]"
     if name == "settled_percent" and record["samples"] > 1:
         low, high = (record[f"settled_percent_{end}"] for end in ("low", "high"))
         return f"{number(record[name], 3)} [{number(low, 3)}, {number(high, 3)}]"

@@ -94,6 +94,13 @@ def test_survival_with_intervals_and_the_worst_sample() -> None:
     assert row.index("[0.790") == head.index("interval")
 
 
+def test_what_never_settles_has_no_interval() -> None:
+    never = dict.fromkeys(("median_orbits", "quantile_95_orbits", "quantile_95_low_orbits", "quantile_95_high_orbits"))
+    _, row = survival_lines([survivor("dispersed", 500, settled_percent_low=0.0, **never)])
+    assert row.split()[:3] == ["pd", "never", "never"]
+    assert "∞" not in row
+
+
 def test_a_single_flight_has_no_interval() -> None:
     head, row = survival_lines([survivor("ideal", 1), survivor("noisy", 1)])
     assert "interval" not in head
