@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -99,20 +99,21 @@ def check_names(dispersions: Mapping[str, Distribution], known: Collection[str])
         raise ArgumentError("dispersions", wrong, f"must be one of {', '.join(known)}{suggestion(wrong, known)}")
 
 
-def draws(distributions: Mapping[str, Distribution], seed: int, samples: Sequence[int]) -> dict[str, Floats]:
+def draws(
+    distributions: Mapping[str, Distribution], known: Iterable[str], seed: int, samples: Sequence[int]
+) -> dict[str, Floats]:
     """Return the numbers of some samples by name, (s,) each.
 
-    A number depends on the seed, its sample and its name, whatever else is drawn: a sample can be drawn again by
-    itself, and a distribution more, or another order of them, leaves the numbers of the others as they were.
+    They are drawn one after the other in the order of the `known` names, whatever the order in which distributions are
+    given. A sample depends on them, the seed and its own number alone, so that it can be drawn again by itself.
     """
-    return {
-        name: np.array([distribution.draw(_generator(seed, sample, name)) for sample in samples], dtype=np.float64)
-        for name, distribution in distributions.items()
-    }
-
-
-def _generator(seed: int, sample: int, name: str) -> np.random.Generator:
-    return np.random.default_rng([seed, sample, *name.encode()])
+    names = [name for name in known if name in distributions]
+    table = {name: np.empty(len(samples)) for name in names}
+    for place, sample in enumerate(samples):
+        random = np.random.default_rng([seed, sample])
+        for name in names:
+            table[name][place] = distributions[name].draw(random)
+    return table
 
 
 def quantile_interval(count: int, share: float) -> tuple[int | None, int | None]:

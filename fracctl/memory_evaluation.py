@@ -81,8 +81,12 @@ class MemoryEvaluation(Evaluation):
         if not self.dispersed:
             super().__post_init__()
         check_laws(self.laws, self.plant.components)
-        states = [f"{_INITIAL}{name}" for name in self.plant.state_names]
-        check_names(self.dispersions, [*states, *names_dispersed(self.plant)])
+        check_names(self.dispersions, self._known)
+
+    @property
+    def _known(self) -> list[str]:
+        """Names of what may be uncertain."""
+        return [*(f"{_INITIAL}{name}" for name in self.plant.state_names), *names_dispersed(self.plant)]
 
     @property
     def dispersed(self) -> bool:
@@ -137,7 +141,7 @@ class MemoryEvaluation(Evaluation):
         samples = table.pop(SAMPLE, np.zeros(b))
         if not self.laws:
             table = self._full_design(table)
-        drawn = draws(self.dispersions, self.seed, [int(sample) for sample in samples])
+        drawn = draws(self.dispersions, self._known, self.seed, [int(sample) for sample in samples])
         parts = []
         for name in names:
             states = self._starts(self.initial_conditions[name], drawn, b)

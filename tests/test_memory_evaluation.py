@@ -78,7 +78,7 @@ def test_a_sample_is_flown_from_what_was_drawn() -> None:
     """From its own release speed and angles, and with its own disturbance."""
     sampled = evaluation([*MONTE_CARLO, "evaluation.samples=3"])
     found = sampled({"law_number": np.zeros(3), "sample": np.arange(3.0)})
-    drawn = draws(sampled.dispersions, 0, range(3))
+    drawn = draws(sampled.dispersions, sampled._known, 0, range(3))
     assert set(drawn) <= set(found)
     for place in range(3):
         start = [0.0009, *(drawn[f"initial_{name}"][place] for name in ("theta", "phi", "length_dot")), 0.0, 0.0]

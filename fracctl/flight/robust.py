@@ -47,12 +47,17 @@ class RobustEvaluation(Evaluation):
             raise ArgumentError("plant", self.plant, "must have units for dispersed starts; set plant.scales")
         if not self.dispersions:
             raise ArgumentError("dispersions", {}, "must hold at least one")
-        check_names(self.dispersions, uncertain.offset_names(self.plant))
+        check_names(self.dispersions, self._known)
+
+    @property
+    def _known(self) -> list[str]:
+        return uncertain.offset_names(self.plant)
 
     @cached_property
     def _each(self) -> Evaluation:
         """The evaluation of every start for itself."""
-        drawn = draws(self.dispersions, self.seed, range(self.first_sample, self.first_sample + self.samples))
+        numbers = range(self.first_sample, self.first_sample + self.samples)
+        drawn = draws(self.dispersions, self._known, self.seed, numbers)
         states = {
             f"{name} {number}": state
             for name, nominal in self.initial_conditions.items()

@@ -138,7 +138,7 @@ class Surroundings:
 
     def drawn(self, samples: Floats) -> dict[str, Floats]:
         """Return the uncertain numbers of samples (b,), (b,) each."""
-        return draws(self.dispersions, self.seed, [int(sample) for sample in samples])
+        return draws(self.dispersions, self.known, self.seed, [int(sample) for sample in samples])
 
     def of(
         self,

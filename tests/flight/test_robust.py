@@ -29,7 +29,7 @@ def built(words: list[str]) -> RobustEvaluation:
 def test_a_row_is_the_quantile_of_its_starts() -> None:
     evaluation = built(["evaluation.quantile=0.9"])
     rows = evaluation(DESIGN)
-    drawn = draws(evaluation.dispersions, 0, range(20))
+    drawn = draws(evaluation.dispersions, evaluation._known, 0, range(20))
     states = starts(evaluation.plant, np.array([0.0, 0.002]), drawn, (0.001, math.sqrt(8.0) * 1e-3))
     for place in range(2):
         law = fc.controllers.PDAlpha(*(DESIGN[name][place] for name in ("k_p_w", "k_d_w", "alpha_w")))
@@ -111,7 +111,7 @@ def test_designs_meet_the_starts_of_their_tests(
     words = [f"experiment={experiment}", f"controller={controller}", f"initial_condition=[{start}]"]
     design = build_checked(compose([*words, "evaluation.samples=3"]))[0]
     assert isinstance(design, RobustEvaluation)
-    numbers = draws(design.dispersions, 0, range(200))
+    numbers = draws(design.dispersions, design._known, 0, range(200))
     nominal = design.initial_conditions[start]
     of_design = starts(design.plant, nominal, numbers, design.sizes[start]) - nominal
     drawn = flown.around.drawn(np.arange(200.0))
