@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -88,7 +89,7 @@ class AdaptiveDelayedFeedback(DelayedFeedback):
         Raises:
             ArgumentError: the gain does not fit.
         """
-        (term,) = super().delayed_terms(n_states, n_controls)
+        term = replace(super().delayed_terms(n_states, n_controls)[0], adapts=True)
         if self.rate.ndim == 0 or len(self.rate) == 1 or term.delay.shape == self.rate.shape:
             return (term,)
         if term.delay.ndim and len(term.delay) > 1:
@@ -96,4 +97,4 @@ class AdaptiveDelayedFeedback(DelayedFeedback):
                 "rate", f"of shape {self.rate.shape}", f"must have the shape of `delay`, {term.delay.shape}"
             )
         delay = np.array(np.broadcast_to(term.delay, self.rate.shape))
-        return (DelayedTerm(term.gain, delay, term.recall, term.switch_on),)
+        return (replace(term, delay=delay),)

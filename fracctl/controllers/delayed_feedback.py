@@ -54,6 +54,8 @@ class DelayedTerm:
     """K(t), where it is not constant; `gain` then has its shape only."""
     on_segment: Callable[[Window], GainFunction] | None = None
     """Asked at the end of each delay for the K(t) of the next one."""
+    adapts: bool = False
+    """Whether the delay is only the one that it begins with."""
 
     @property
     def batch(self) -> int | None:
@@ -173,8 +175,9 @@ class DelayedSum:
     def __init__(self, *laws: DelayedFeedback) -> None:
         if len(laws) < 2:
             raise ArgumentError("laws", f"a number of {len(laws)}", "must be two or more")
-        if any(law.history is not None for law in laws[1:]):
-            raise ArgumentError("history", "given with another than the first law", "must be given with the first")
+        if any(law.history is not None or law.history_breaks for law in laws[1:]):
+            allowed = "must be given with the first, and so its breaks"
+            raise ArgumentError("history", "given with another than the first law", allowed)
         self.laws = laws
         self.history, self.history_breaks = laws[0].history, laws[0].history_breaks
 

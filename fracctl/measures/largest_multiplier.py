@@ -9,7 +9,7 @@ import numpy as np
 
 from fracctl.arrays import Complexes, Floats
 from fracctl.controllers.delayed_feedback import DelayedTerm, GainFunction
-from fracctl.errors import ArgumentError
+from fracctl.errors import ArgumentError, UnsupportedError
 from fracctl.measures.base import OfTrajectories
 from fracctl.measures.periods import periods
 from fracctl.stability.floquet import FEWEST_NODES, Neighbourhood, nontrivial_multipliers, real_above_one
@@ -23,7 +23,7 @@ class LargestMultiplier(OfTrajectories):
     The target is the free orbit whose period is the last delay, found by shooting from a guess. NaN where there is
     none. Of a run without control (K = 0) these are the multipliers of the free motion. Beside it stands how many of
     the target's own multipliers are real and above 1 (`fracctl.stability.real_above_one`): an odd number cannot be
-    stabilised where the plant depends on time.
+    stabilised where the plant depends on time. The terms of a sum act together, with one delay and one recall.
 
     Args:
         guess: a state at time 0 near the target, (n,); None for the state after the last whole number of delays.
@@ -42,7 +42,17 @@ class LargestMultiplier(OfTrajectories):
         self.guess, self.nodes = guess, nodes
 
     def __call__(self, trajectory: StepwiseTrajectory) -> dict[str, Floats]:
-        """Return columns ``largest_multiplier`` and ``free_multipliers_above_one``, (b,)."""
+        """Return columns ``largest_multiplier`` and ``free_multipliers_above_one``, (b,).
+
+        Raises:
+            UnsupportedError: the terms of the control differ in delay or recall.
+        """
+        first = trajectory.terms[:1]
+        if any(not _alike(term, one) for one in first for term in trajectory.terms[1:]):
+            raise UnsupportedError(
+                "the largest multiplier is that of one delay with one recall, but the control is a sum with several;"
+                " leave the measure out, or take laws of one delay"
+            )
         delays = periods(trajectory, None)
         guesses = self._guesses(trajectory, delays)
         targets: dict[tuple[float, ...], _Target | None] = {}
@@ -72,10 +82,26 @@ class _Target:
 def _of(target: _Target | None, trajectory: StepwiseTrajectory, member: int) -> tuple[float, float]:
     if target is None:
         return np.nan, np.nan
-    term = trajectory.terms[0]
-    gain = _gain(term, trajectory, member)
-    values = target.free if gain is None else target.near.nontrivial(gain, float(term.recall[member]))
+    parts = [part for term in trajectory.terms if (part := _gain(term, trajectory, member)) is not None]
+    values = (
+        target.near.nontrivial(_together(parts), float(trajectory.terms[0].recall[member])) if parts else target.free
+    )
     return float(np.abs(values[0])), float(real_above_one(target.free))
+
+
+def _alike(one: DelayedTerm, other: DelayedTerm) -> bool:
+    return np.array_equal(one.delay, other.delay) and np.array_equal(one.recall, other.recall)
+
+
+def _together(parts: list[Floats | GainFunction]) -> Floats | GainFunction:
+    """Return the sum of gains and gain functions."""
+    if len(parts) == 1:
+        return parts[0]
+    functions = [part for part in parts if callable(part)]
+    constant: Floats = np.sum([part for part in parts if not callable(part)], axis=0)
+    if not functions:
+        return constant
+    return lambda times: constant + sum(function(times) for function in functions)
 
 
 def _gain(term: DelayedTerm, trajectory: StepwiseTrajectory, member: int) -> Floats | GainFunction | None:

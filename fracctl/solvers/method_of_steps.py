@@ -81,6 +81,8 @@ class MethodOfSteps:
         """Return None for delayed feedback and free motion, otherwise why it is refused and what to use instead."""
         if len(loop.delayed_terms) > 1 and any(term.on_segment is not None for term in loop.delayed_terms):
             return f"the {self.name} solver renews gains with one delay only; use one law"
+        if len(loop.delayed_terms) > 1 and any(term.adapts for term in loop.delayed_terms):
+            return f"the {self.name} solver adapts a delay that stands alone; use one law"
         if Need.NONLINEAR_LAW in loop.needs:
             use = "implicit_memory"
         elif Need.FRACTIONAL_TERMS in loop.needs:

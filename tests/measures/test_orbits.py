@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.linalg import solve_continuous_are
 
-from fracctl.controllers import DelayedFeedback
+from fracctl.controllers import DelayedFeedback, DelayedSum
 from fracctl.errors import ArgumentError, UnsupportedError
 from fracctl.loop import ClosedLoop
 from fracctl.measures import (
@@ -22,6 +22,7 @@ from fracctl.measures import (
     periodicity_error,
     settling_periods,
 )
+from fracctl.measures.largest_multiplier import LargestMultiplier
 from fracctl.plants import HCW, Chief, FunctionPlant, Libration, RelativeMotion, RotatingEllipsoid
 from fracctl.solvers import MethodOfSteps
 from fracctl.stepwise import StepwiseTrajectory
@@ -46,6 +47,24 @@ def test_periodicity_error_of_a_spiral() -> None:
         np.exp(-5.5) * abs(1.0 - np.exp(0.5 - 0.5j)), rel=1e-11
     )
     assert periodicity_error(decaying(2.0, 1.5)) == np.inf
+
+
+def test_multipliers_of_a_sum_are_those_of_all_its_terms() -> None:
+    """A gain in two parts, one of them a function of time, controls as the whole does."""
+    start, measure = [-0.28, -1.08], LargestMultiplier(guess=[-0.28, -1.08])
+
+    def found(law: DelayedFeedback | DelayedSum) -> float:
+        trajectory = MethodOfSteps(40).solve(ClosedLoop(Libration(), law), start, 4.0 * TURN)
+        return float(measure(trajectory)["largest_multiplier"][0])
+
+    half = DelayedFeedback([[0.0, 0.15]], TURN)
+    timed = DelayedFeedback(lambda times: np.broadcast_to([[0.0, 0.15]], (*times.shape, 1, 2)), TURN)
+    whole = found(DelayedFeedback([[0.0, 0.3]], TURN))
+    assert found(DelayedSum(half, half)) == pytest.approx(whole, rel=1e-9)
+    assert found(DelayedSum(half, timed)) == pytest.approx(whole, rel=1e-9)
+    assert found(half) != pytest.approx(whole, rel=0.1)
+    with pytest.raises(UnsupportedError, match="one delay with one recall"):
+        found(DelayedSum(half, DelayedFeedback([[0.0, 0.15]], 2.0 * TURN)))
 
 
 def test_settling_of_a_spiral() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad, solve_ivp
 
-from fracctl.controllers import AdaptiveDelayedFeedback, DelayedFeedback, Saturation
+from fracctl.controllers import AdaptiveDelayedFeedback, DelayedFeedback, DelayedSum, Saturation
 from fracctl.design import lqr
 from fracctl.errors import ArgumentError, UnsupportedError
 from fracctl.loop import ClosedLoop
@@ -46,6 +46,30 @@ def test_the_continuous_law() -> None:
         error = error_and_slope(39.0, trajectory.delay([39.0])[i, 0])[0]
         np.testing.assert_allclose(trajectory.control([39.0])[i, 0], -0.1 * error, rtol=0, atol=1e-9)
     np.testing.assert_array_equal(trajectory.delay([0.0, 5.8])[0], 5.9)
+
+
+def test_a_batch_of_rates_keeps_a_gain_that_depends_on_time() -> None:
+    """K(t) = 0.1 sin t: the control of each of two rates is that of the rate alone."""
+
+    def gain(times: np.ndarray) -> np.ndarray:
+        return 0.1 * np.sin(times)[..., None, None] * np.eye(2)
+
+    times = np.array([8.0, 11.3, 17.9])
+    together = MethodOfSteps(40).solve(
+        ClosedLoop(KNOWN, AdaptiveDelayedFeedback(gain, 6.0, np.array([0.02, 0.1]), "always")), [0.0, 1.0], 20.0
+    )
+    for i, rate in enumerate((0.02, 0.1)):
+        alone = MethodOfSteps(40).solve(
+            ClosedLoop(KNOWN, AdaptiveDelayedFeedback(gain, 6.0, rate, "always")), [0.0, 1.0], 20.0
+        )
+        assert np.abs(alone.control(times)).max() > 1e-3
+        np.testing.assert_allclose(together.control(times)[i], alone.control(times), rtol=0, atol=1e-12)
+
+
+def test_a_sum_does_not_adapt() -> None:
+    law = DelayedSum(AdaptiveDelayedFeedback(np.zeros((2, 2)), 6.0), DelayedFeedback(np.zeros((2, 2)), 5.0))
+    with pytest.raises(UnsupportedError, match="adapts a delay that stands alone; use one law"):
+        MethodOfSteps().solve(ClosedLoop(KNOWN, law), [0.0, 1.0], 20.0)
 
 
 def test_the_law_per_orbit() -> None:

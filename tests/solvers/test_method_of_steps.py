@@ -311,6 +311,10 @@ def test_a_tolerance_tells_failures_apart() -> None:
         (lambda p: DelayedFeedback([[0.0, 1.0]], [[1.0]]), r"`delay` must have shape \(\) or \(b,\), but is of shape"),
         (lambda p: DelayedFeedback([[0.0, 1.0]], 1.0, history=np.zeros((2, 2))), "`history` must be a function or"),
         (lambda p: DelayedSum(DelayedFeedback([[0.0, 1.0]], 1.0)), "`laws` must be two or more, but is a number of 1"),
+        (
+            lambda p: DelayedSum(*(DelayedFeedback([[0.0, 1.0]], 1.0, history_breaks=b) for b in ((), -0.5))),
+            "`history` must be given with the first, and so its breaks",
+        ),
         (lambda p: ClosedLoop(p, DelayedFeedback([0.0, 1.0], 1.0)), r"`gain` must have shape \(1, 2\) or \(b, 1, 2\)"),
         (lambda p: ClosedLoop(p, DelayedFeedback(np.zeros((3, 1, 2)), [1.0, 2.0])), "must have the same batch size"),
         (lambda p: MethodOfSteps(7), "`steps` must be a whole number from 8 to 100000, but is 7"),
