@@ -14,6 +14,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from fracctl.arrays import Array, Floats
+from fracctl.fractional.barycentric import interpolation, lobatto_weights
 
 
 @dataclass(frozen=True)
@@ -72,8 +73,7 @@ class _Rule:
 def _rule(n: int) -> _Rule:
     k = np.arange(n)
     y = np.sin(0.5 * np.pi * (2.0 * k - (n - 1)) / (n - 1))
-    weights = np.where(k % 2 == 0, 1.0, -1.0)
-    weights[[0, -1]] *= 0.5
+    weights = lobatto_weights(n)
     gap = y[:, None] - y + np.eye(n)
     slope = (weights / weights[:, None]) / gap
     slope -= np.diag(slope.sum(axis=1))
@@ -88,18 +88,6 @@ def _rule(n: int) -> _Rule:
     scale = np.where(degrees == n - 1, 1.0, 2.0) / (n - 1)
     last = cosines * scale * np.where((k == 0) | (k == n - 1), 0.5, 1.0)[:, None]
     return _Rule(y, weights, np.ascontiguousarray(slope.T), integral, last)
-
-
-def interpolation(nodes: Floats, weights: Floats, y: Floats) -> Floats:
-    """Return the matrix (r, n) that takes node values to values at the r points y (barycentric form)."""
-    gap = y[:, None] - nodes
-    hit = gap == 0.0
-    rows = hit.any(axis=1)
-    gap[hit] = 1.0
-    matrix = weights / gap
-    matrix /= matrix.sum(axis=1, keepdims=True)
-    matrix[rows] = hit[rows]
-    return matrix
 
 
 class PanelGrid:

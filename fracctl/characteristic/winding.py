@@ -17,6 +17,7 @@ from fracctl.characteristic.doubts import zeros_with_doubts
 from fracctl.characteristic.equation import Equation, equations
 from fracctl.characteristic.matrix import CharacteristicMatrix, Powers
 from fracctl.characteristic.phase import COUNTED, DOUBTFUL, SHORT, zeros_to_the_right
+from fracctl.fractional.terms import turned
 
 _INNER, _INNERMOST = np.log(1e-5), -1e5
 """Logarithms of the radii at which a path ends, at first and at most."""
@@ -70,19 +71,11 @@ def _by_sign(equation: Equation, highest: Floats) -> tuple[Floats, Booleans, Boo
         none = np.zeros(len(equation.limit), dtype=bool)
         return np.zeros(len(none)), none, none.copy()
     divided = (equation.degree - highest)[:, None]
-    lift = equation.coefficients * _sine(np.round(equation.orders - divided, 12))
+    lift = equation.coefficients * turned(np.round(equation.orders - divided, 12)).imag
     up, down = (lift > 0.0).any(axis=1), (lift < 0.0).any(axis=1)
     negative, known = equation.limit < 0.0, np.abs(equation.limit) > equation.vanishing
     zeros = np.where(negative, 1.0, np.where(down, 2.0, 0.0))
     return zeros, known & ((up != down) | (negative & ~up & ~down)), known & ~(up & down)
-
-
-def _sine(order: Floats) -> Floats:
-    """Return sin(order π/2), exact for whole orders."""
-    whole = np.rint(order)
-    exact = np.array([0.0, 1.0, 0.0, -1.0])[whole.astype(int) % 4]
-    sine: Floats = np.where(order == whole, exact, np.sin(0.5 * np.pi * order))
-    return sine
 
 
 def _followed(equation: Equation, outer: float) -> tuple[Floats, Booleans]:

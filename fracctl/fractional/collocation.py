@@ -19,6 +19,7 @@ from scipy.linalg import eigh_tridiagonal
 from scipy.special import rgamma
 
 from fracctl.arrays import Floats
+from fracctl.fractional.barycentric import interpolation, lobatto_weights
 
 _CACHED = 512
 _BEYOND_DEGREE = 12
@@ -37,14 +38,7 @@ class ChebyshevNodes:
 
     def interpolation(self, points: Floats) -> Floats:
         """Return the matrix (r, n) that takes values at the nodes to values at r points."""
-        gap = points[:, None] - self.t
-        hit = gap == 0.0
-        rows = hit.any(axis=1)
-        gap[hit] = 1.0
-        matrix = self.weights / gap
-        matrix[rows] = hit[rows]
-        matrix /= matrix.sum(axis=1, keepdims=True)
-        return matrix
+        return interpolation(self.t, self.weights, points)
 
 
 @lru_cache(maxsize=64)
@@ -53,8 +47,7 @@ def chebyshev_nodes(n: int) -> ChebyshevNodes:
     k = np.arange(n)
     angle = 0.5 * np.pi / (n - 1)
     t = np.sin(k * angle) ** 2
-    weights = np.where(k % 2 == 0, 1.0, -1.0)
-    weights[[0, -1]] *= 0.5
+    weights = lobatto_weights(n)
     gap = np.sin((k[:, None] + k) * angle) * np.sin((k[:, None] - k) * angle) + np.eye(n)
     slope = (weights / weights[:, None]) / gap
     np.fill_diagonal(slope, 0.0)

@@ -61,3 +61,11 @@ def powers(sigma: Complexes, orders: Floats) -> Complexes:
         if np.any(where):
             values[where] = sigma**integer
     return values
+
+
+def turned(orders: Floats) -> Complexes:
+    """Return i^β, exact for whole orders."""
+    whole = np.rint(orders)
+    exact = np.array([1.0, 1j, -1.0, -1j])[whole.astype(int) % 4]
+    values: Complexes = np.where(orders == whole, exact, np.exp(0.5j * np.pi * orders))
+    return values

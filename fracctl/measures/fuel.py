@@ -6,10 +6,11 @@ import numpy as np
 
 from fracctl.arrays import Floats
 from fracctl.errors import ArgumentError
+from fracctl.fractional.barycentric import interpolation
 from fracctl.measures.control_effort import ControlEffort
 from fracctl.measures.in_units import TURN, InUnits, last_orbit
 from fracctl.measures.peak_acceleration import PeakAcceleration
-from fracctl.panels import PanelGrid, interpolation
+from fracctl.panels import PanelGrid
 from fracctl.trajectory import Trajectory
 from fracctl.units import STANDARD_GRAVITY_M_S2, Spacecraft
 

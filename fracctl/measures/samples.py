@@ -9,7 +9,8 @@ import numpy as np
 
 from fracctl.arrays import Floats
 from fracctl.errors import ArgumentError
-from fracctl.panels import PanelGrid, interpolation
+from fracctl.fractional.barycentric import interpolation
+from fracctl.panels import PanelGrid
 from fracctl.polynomials import comparing, over_rows
 
 MOST_SAMPLES = 1_000_000

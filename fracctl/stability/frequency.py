@@ -9,7 +9,7 @@ import numpy as np
 from fracctl.arrays import Array, Complexes, Floats
 from fracctl.characteristic.bounds import pole_radius
 from fracctl.characteristic.matrix import CharacteristicMatrix
-from fracctl.fractional.terms import FractionalTerm
+from fracctl.fractional.terms import FractionalTerm, turned
 from fracctl.loop import ClosedLoop
 from fracctl.plants.linear import LinearPlant
 
@@ -108,14 +108,6 @@ def _sum(terms: Sequence[FractionalTerm], omega: Floats, rows: Array) -> Complex
             total = total + np.zeros((1, *matrix.shape[-2:]))
             continue
         orders = part.orders if part.orders.ndim == 2 else part.orders[None]
-        values = np.exp(orders[:, None, :] * np.log(omega)[..., None]) * _turned(orders)[:, None, :]
+        values = np.exp(orders[:, None, :] * np.log(omega)[..., None]) * turned(orders)[:, None, :]
         total = total + matrix[:, None] * values[..., None, :]
     return total
-
-
-def _turned(orders: Floats) -> Complexes:
-    """Return i^β, exact for whole orders."""
-    whole = np.rint(orders)
-    exact = np.array([1.0, 1j, -1.0, -1j])[whole.astype(int) % 4]
-    turned: Complexes = np.where(orders == whole, exact, np.exp(0.5j * np.pi * orders))
-    return turned

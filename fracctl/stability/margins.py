@@ -18,6 +18,8 @@ _AT_ONCE = 512
 """Members whose curves are held in memory together."""
 _REAL = 1e-9
 """|Im L| over |L| of a loop gain that is real at frequency 0."""
+_VANISHING = 1e-50
+"""Below it a factor stands for 0, and above its inverse for infinity: those are limits at frequency 0."""
 
 _Pair = tuple[Complexes, Complexes]
 """C and M, (n, k, m, m)."""
@@ -174,6 +176,7 @@ def _gain_margins(response: Response, rows: Array, grid: Floats, on_grid: _Pair)
     negative = (control * plant.conj()).real <= 0.0
     with np.errstate(divide="ignore"):
         factors = np.abs(plant[negative]) / np.abs(control[negative])
+    factors = np.where(factors < _VANISHING, 0.0, np.where(factors > 1.0 / _VANISHING, np.inf, factors))
     members = members[negative]
     above, below = np.full(rows.size, np.inf), np.zeros(rows.size)
     np.minimum.at(above, members[factors > 1.0], factors[factors > 1.0])
