@@ -32,6 +32,10 @@ SAMPLES_IN_PERIOD = 100
 _NEEDED_OF_PLANTS = {"period": ("period", "first_return or given"), "first_return": ("section", "period or given")}
 
 
+def _has(plant: object, needed: str) -> bool:
+    return period_of(plant) is not None if needed == "period" else isinstance(plant, SectionedPlant)
+
+
 @dataclass(frozen=True)
 class DelayedEvaluation(Evaluation):
     """How a design point becomes a row for each initial condition, for plants in state form under delayed feedback.
@@ -57,8 +61,7 @@ class DelayedEvaluation(Evaluation):
         super().__post_init__()
         plant: Any = self.plant
         needed, others = _NEEDED_OF_PLANTS.get(self.delay_from, (None, ""))
-        lacks = {"period": period_of(plant) is None, "section": not isinstance(plant, SectionedPlant)}
-        if needed is not None and lacks[needed]:
+        if needed is not None and not _has(plant, needed):
             allowed = f"{type(plant).__name__} has no {needed} of its own"
             raise ArgumentError("evaluation.delay_from", self.delay_from, allowed, f"take {others}")
         for measure in self.measures:

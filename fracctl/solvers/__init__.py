@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from fracctl.lazy import loaded_at_first_use
-from fracctl.solvers.base import Solver, Survey
+from fracctl.solvers.base import SolvedMembers, Solver
 from fracctl.solvers.solve import solve
 
 if TYPE_CHECKING:
@@ -25,8 +25,8 @@ __all__ = [
     "ExplicitMemory",
     "ImplicitMemory",
     "MethodOfSteps",
+    "SolvedMembers",
     "Solver",
-    "Survey",
     "Volterra",
     "solve",
 ]

@@ -12,7 +12,7 @@ from fracctl.trajectory import Trajectory
 
 
 @dataclass(frozen=True)
-class Survey:
+class SolvedMembers:
     """Some members of a batch, solved from k initial states on one grid."""
 
     rows: Array
@@ -41,7 +41,7 @@ class Solver(Protocol):
         """Return the trajectories of all members on one grid."""
         ...
 
-    def survey(self, loop: ClosedLoop, initial_states: Floats, horizon: float) -> Iterator[Survey]:
+    def survey(self, loop: ClosedLoop, initial_states: Floats, horizon: float) -> Iterator[SolvedMembers]:
         """Yield groups of members of a large batch, each from all k initial states (k, n), on grids of their own.
 
         Unstable members need no trajectory; theirs may be NaN.

@@ -16,7 +16,7 @@ from fracctl.characteristic.winding import abscissa_bound, unstable_zeros, verdi
 from fracctl.errors import UnsupportedError
 from fracctl.fractional.system import LinearFractionalSystem, unsolved_for_highest
 from fracctl.loop import ClosedLoop, Need
-from fracctl.solvers.base import Survey
+from fracctl.solvers.base import SolvedMembers
 from fracctl.solvers.members import Members, common_batch, equal_orders
 from fracctl.solvers.results import merged, without_trajectory
 from fracctl.trajectory import Trajectory
@@ -69,7 +69,7 @@ class BatchSolver(ABC):
         parts = list(self._groups(Members(system, y0, rate, positive("horizon", horizon), every=True)))
         return replace(merged(parts, batch), batched=loop.batch is not None or state.ndim == 2)
 
-    def survey(self, loop: ClosedLoop, initial_states: ArrayLike, horizon: float) -> Iterator[Survey]:
+    def survey(self, loop: ClosedLoop, initial_states: ArrayLike, horizon: float) -> Iterator[SolvedMembers]:
         """Yield members group by group, each from all k initial states (k, n); unstable ones without trajectory."""
         self._check(loop)
         y0, rate = loop.initial_values(np.atleast_2d(finite("initial_states", initial_states)))
@@ -81,7 +81,7 @@ class BatchSolver(ABC):
         if refusal:
             raise UnsupportedError(refusal)
 
-    def _groups(self, everyone: Members) -> Iterator[Survey]:
+    def _groups(self, everyone: Members) -> Iterator[SolvedMembers]:
         """Split the members by orders, tell the unstable apart and solve the rest."""
         for which in equal_orders(everyone.system, self.fewest_shared):
             members = everyone.take(which)
@@ -104,7 +104,7 @@ class BatchSolver(ABC):
         return unsolved_for_highest(system, f"the {self.name} solver")
 
     @abstractmethod
-    def _solved(self, members: Members, rows: Array, radius: Floats, shift: Floats) -> Iterator[Survey]:
+    def _solved(self, members: Members, rows: Array, radius: Floats, shift: Floats) -> Iterator[SolvedMembers]:
         """Solve `rows` of the members.
 
         Args:

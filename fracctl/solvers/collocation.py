@@ -18,7 +18,7 @@ from fracctl.errors import ArgumentError
 from fracctl.fractional.collocation import derivative_matrix, power_derivative
 from fracctl.fractional.system import LinearFractionalSystem
 from fracctl.panels import PanelGrid
-from fracctl.solvers.base import Survey
+from fracctl.solvers.base import SolvedMembers
 from fracctl.solvers.batched import BatchSolver
 from fracctl.solvers.collocation_equations import FORMS, Equations
 from fracctl.solvers.members import Members, whole
@@ -65,7 +65,7 @@ class Collocation(BatchSolver):
             raise ArgumentError("tolerance", tolerance, "must lie in (0, 1)")
         self.form, self.tolerance, self.cross_check = form, float(tolerance), share("cross_check", cross_check)
 
-    def _solved(self, members: Members, rows: Array, radius: Floats, shift: Floats) -> Iterator[Survey]:
+    def _solved(self, members: Members, rows: Array, radius: Floats, shift: Floats) -> Iterator[SolvedMembers]:
         del radius
         k, unknowns = len(members.y0), 2 * members.system.size * (self.nodes + 1)
         chunk = max(_LARGEST_CHUNK // (unknowns * (unknowns + 8 * k)), 1)

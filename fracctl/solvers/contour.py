@@ -23,7 +23,7 @@ from fracctl.characteristic.bounds import SMALLEST_RADIUS, pole_height
 from fracctl.characteristic.matrix import CharacteristicMatrix
 from fracctl.characteristic.poles import principal_poles
 from fracctl.errors import ArgumentError, UnsupportedError
-from fracctl.solvers.base import Survey
+from fracctl.solvers.base import SolvedMembers
 from fracctl.solvers.batched import BatchSolver
 from fracctl.solvers.contour_lanes import LANES
 from fracctl.solvers.contour_loops import loops
@@ -98,7 +98,7 @@ class Contour(BatchSolver):
             raise ArgumentError("tolerance", tolerance, "must lie in [1e-11, 1e-3]")
         self.tolerance, self.cross_check = float(tolerance), share("cross_check", cross_check)
 
-    def _solved(self, members: Members, rows: Array, radius: Floats, shift: Floats) -> Iterator[Survey]:
+    def _solved(self, members: Members, rows: Array, radius: Floats, shift: Floats) -> Iterator[SolvedMembers]:
         """Solve `rows`; those that miss the tolerance again, the last time as they come out."""
         cost = np.zeros(len(radius), dtype=np.int64)
         single = members.system.n_positions == 1

@@ -23,7 +23,7 @@ from fracctl.panels import Panel, PanelGrid
 from fracctl.plants.capabilities import members_of
 from fracctl.plants.linear import LinearPlant
 from fracctl.plants.state import StatePlant
-from fracctl.solvers.base import Survey
+from fracctl.solvers.base import SolvedMembers
 from fracctl.solvers.explicit_memory_law import highest_used, signals
 from fracctl.solvers.explicit_memory_mesh import step_edges
 from fracctl.solvers.explicit_memory_run import Problem, Run, run
@@ -118,7 +118,7 @@ class ExplicitMemory:
         trajectory = merged(parts, batch, _common_grid(parts))
         return replace(trajectory, batched=loop.batch is not None or state.ndim == 2)
 
-    def survey(self, loop: ClosedLoop, initial_states: ArrayLike, horizon: float) -> Iterator[Survey]:
+    def survey(self, loop: ClosedLoop, initial_states: ArrayLike, horizon: float) -> Iterator[SolvedMembers]:
         """Yield members group by group, each from all k initial states (k, n)."""
         self._check(loop)
         start = np.concatenate(_states(loop, np.atleast_2d(finite("initial_states", initial_states))), axis=-1)
@@ -130,7 +130,7 @@ class ExplicitMemory:
         if refusal:
             raise UnsupportedError(refusal)
 
-    def _parts(self, loop: ClosedLoop, start: Floats, horizon: float) -> Iterator[Survey]:
+    def _parts(self, loop: ClosedLoop, start: Floats, horizon: float) -> Iterator[SolvedMembers]:
         """Solve from states (k, b, n), some members at a time."""
         k, b, n = start.shape
         stable = _verdicts(loop, b, horizon)
@@ -185,7 +185,7 @@ class _Part:
     nodes: Array
 
 
-def _packed(part: _Part, rows: Array, stable: Array, k: int, tolerance: float) -> Survey:
+def _packed(part: _Part, rows: Array, stable: Array, k: int, tolerance: float) -> SolvedMembers:
     """Return members as trajectories with their status; NaN behind events and where nothing was found."""
     solved, m = part.run, part.run.problem.signals.n_positions
     b = len(part.error)
@@ -216,7 +216,7 @@ def _packed(part: _Part, rows: Array, stable: Array, k: int, tolerance: float) -
         error_estimate=np.where(np.isfinite(part.error), part.error, np.nan),
         counters={"nodes": part.nodes},
     )
-    return Survey(rows[part.rows], trajectory)
+    return SolvedMembers(rows[part.rows], trajectory)
 
 
 def _has_grown(solved: Run) -> Booleans:
@@ -258,7 +258,7 @@ def _is_second_order(plant: LinearPlant | StatePlant) -> bool:
     return bool(rates.all())
 
 
-def _common_grid(parts: list[Survey]) -> PanelGrid | None:
+def _common_grid(parts: list[SolvedMembers]) -> PanelGrid | None:
     """Return a grid on which the polynomials of all parts are polynomials; None for a single part."""
     if len(parts) == 1:
         return None

@@ -8,13 +8,15 @@ import numpy as np
 
 from fracctl.arrays import Array, Booleans, Floats
 from fracctl.panels import Panel, PanelGrid
-from fracctl.solvers.base import Survey
+from fracctl.solvers.base import SolvedMembers
 from fracctl.solvers.members import Members
 from fracctl.solvers.outputs import Values
 from fracctl.trajectory import Trajectory
 
 
-def packed(members: Members, response: Values, chosen: Array, good: Booleans, nodes: Array, grid: PanelGrid) -> Survey:
+def packed(
+    members: Members, response: Values, chosen: Array, good: Booleans, nodes: Array, grid: PanelGrid
+) -> SolvedMembers:
     """Return the `chosen` of the members with their status, k·r trajectories."""
     k, count = response.positions.shape[:2]
     everyone = len(chosen) == count
@@ -41,10 +43,10 @@ def packed(members: Members, response: Values, chosen: Array, good: Booleans, no
         error_estimate=flat(response.error),
         counters={"nodes": np.tile(nodes[chosen], k)},
     )
-    return Survey(members.rows[chosen], trajectory)
+    return SolvedMembers(members.rows[chosen], trajectory)
 
 
-def without_trajectory(members: Members, status: str) -> Survey:
+def without_trajectory(members: Members, status: str) -> SolvedMembers:
     """Return members that have no trajectory, with NaN in its place and `status` to say why."""
     start = members.initial_states()
     k, b, _ = start.shape
@@ -66,10 +68,10 @@ def without_trajectory(members: Members, status: str) -> Survey:
         error_estimate=np.full(k * b, np.nan),
         counters={"nodes": np.zeros(k * b, dtype=np.int64)},
     )
-    return Survey(members.rows, trajectory)
+    return SolvedMembers(members.rows, trajectory)
 
 
-def merged(parts: list[Survey], batch: int, common: PanelGrid | None = None) -> Trajectory:
+def merged(parts: list[SolvedMembers], batch: int, common: PanelGrid | None = None) -> Trajectory:
     """Bring all members to one grid, by default one that resolves them all."""
     first = parts[0].trajectory
     if len(parts) == 1 and np.array_equal(parts[0].rows, np.arange(batch)):

@@ -18,7 +18,7 @@ from fracctl.arrays import Array, Floats, share
 from fracctl.errors import ArgumentError, UnsupportedError
 from fracctl.fractional.series import PowerSeries, short_time_series
 from fracctl.fractional.system import LinearFractionalSystem, order_margin
-from fracctl.solvers.base import Survey
+from fracctl.solvers.base import SolvedMembers
 from fracctl.solvers.batched import BatchSolver
 from fracctl.solvers.members import Members, whole
 from fracctl.solvers.outputs import Values, values
@@ -79,7 +79,7 @@ class Volterra(BatchSolver):
             )
         return super()._refusal(system)
 
-    def _solved(self, members: Members, rows: Array, radius: Floats, shift: Floats) -> Iterator[Survey]:
+    def _solved(self, members: Members, rows: Array, radius: Floats, shift: Floats) -> Iterator[SolvedMembers]:
         """Solve `rows`; those that miss the tolerance again on more panels, the last time as they come out."""
         del shift
         cost = np.zeros(len(radius), dtype=np.int64)
@@ -112,7 +112,7 @@ class Volterra(BatchSolver):
         counts: Array = np.append(_PANEL_COUNTS, _MOST_PANELS + 1)[places]
         return counts
 
-    def _refused(self, members: Members, rows: Array) -> Survey:
+    def _refused(self, members: Members, rows: Array) -> SolvedMembers:
         if members.every:
             raise UnsupportedError(
                 f"the volterra solver cannot resolve oscillations as fast as these up to {members.horizon:g};"

@@ -68,7 +68,7 @@ def test_bounds_in_three_units_are_the_same() -> None:
     ):
         limit = built(*FLOWN, *words, "evaluation.largest_by=axis").saturation
         assert limit is not None
-        assert float(limit.limit) == pytest.approx(dimensionless, rel=1e-14)
+        assert limit.limit.item() == pytest.approx(dimensionless, rel=1e-14)
         assert limit.by == "axis"
     assert built("spacecraft.mass_kg=500").saturation is None
 
