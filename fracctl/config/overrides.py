@@ -141,7 +141,8 @@ def _check_key(override: Override, groups: Sequence[str]) -> None:
 def _refuse_second(first: Override, second: Override) -> None:
     group = first.key
     one, other = first.written_value, second.written_value
-    cure = f"for both in one run, write {group}=[{one},{other}]; " if group in SEVERAL_ALLOWED else ""
+    both = f"[{one.strip('[]')},{other.strip('[]')}]"
+    cure = f"for both in one run, write {group}={both}; " if group in SEVERAL_ALLOWED else ""
     raise ConfigurationError(
         f"{_words(group)} is chosen twice, '{first.text}' and '{second.text}'; {cure}for a run with each, write "
         f"-m {group}={one},{other}"

@@ -94,6 +94,7 @@ def test_a_misspelt_experiment_does_not_run_the_default() -> None:
         (["experiment=ic1_outofplane", "experiment=ic2_outofplane"], "experiment is chosen twice"),
         (["plant=hcw", "plant=hcw_in_plane"], "plant is chosen twice"),
         (["initial_condition=ic1", "initial_condition=ic2"], "for both in one run, write initial_condition=[ic1,ic2]"),
+        (["figures=[poles]", "figures=[trajectories,bode]"], "one run, write figures=[poles,trajectories,bode]"),
         (["plant=[hcw,hcw_in_plane]"], "a run has one plant"),
         (["hydra.run.dir=x"], "runs are stored below output_dir=DIR"),
         (["hydra/launcher=basic"], "Hydra's own settings"),
