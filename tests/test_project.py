@@ -120,10 +120,10 @@ def test_changelog_follows_its_form() -> None:
     assert kinds <= {"Added", "Changed", "Deprecated", "Removed", "Fixed", "Security"}
 
 
-@pytest.mark.parametrize("name", ["README.md", "docs/first_hour.md"])
-def test_documents_say_how_a_shell_comes_to_know_the_command(name: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("page", ["README.md", "docs/first_hour.md"])
+def test_documents_say_how_a_shell_comes_to_know_the_command(page: str, tmp_path: Path) -> None:
     """The line is there before the first command, and works with what `make demo` sets up."""
-    text = (ROOT / name).read_text(encoding="utf-8")
+    text = (ROOT / page).read_text(encoding="utf-8")
     (line,) = dict.fromkeys(re.findall(r"\. \S+/activate", text))
     first = next(re.finditer(r"^```\w+\n(\$ )?fracctl ", text, flags=re.MULTILINE))
     assert text.index(line) < first.start()

@@ -121,7 +121,10 @@ def _computed(words: Sequence[str], options: argparse.Namespace) -> Iterator[tup
     with Executors() as executors:
         for label, config, command in jobs:
             summary = execute_run(
-                config, command, progress=display(label or config.name, options.quiet), executors=executors
+                config,
+                command=command,
+                progress=display(label or config.name, options.quiet),
+                executors=executors,
             ).summary
             if summary.get("error"):
                 raise FracctlError(f"{label or config.name}: {summary['error']}")

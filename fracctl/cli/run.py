@@ -92,7 +92,7 @@ def _run(job: Job, options: argparse.Namespace, executors: Executors) -> Ended:
         job,
         options,
         lambda progress: execute_run(
-            job.config, job.command, fresh=options.fresh, progress=progress, executors=executors
+            job.config, command=job.command, fresh=options.fresh, progress=progress, executors=executors
         ),
     )
 

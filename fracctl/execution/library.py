@@ -37,7 +37,7 @@ def run(experiment: str, overrides: Sequence[str] = (), *, config_dir: str | Pat
     chosen_run = experiment if study_file(experiment) else f"experiment={experiment}"
     arguments = [chosen_run, *default, *overrides]
     directory = None if config_dir is None else Path(config_dir)
-    result = execute(compose(arguments, directory), Command.of(arguments, directory))
+    result = execute(compose(arguments, directory), command=Command.of(arguments, directory))
     if error := result.summary.get("error"):
         warnings.warn(f"{experiment}: {error}", IncompleteRunWarning, stacklevel=2)
     return result

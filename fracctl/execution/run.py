@@ -17,8 +17,8 @@ __all__ = ["RunResult", "execute"]
 
 def execute(
     config: RunConfig,
-    command: Command | None = None,
     *,
+    command: Command | None = None,
     fresh: bool = False,
     directory: RunDirectory | None = None,
     progress: Progress | None = None,

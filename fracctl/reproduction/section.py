@@ -118,7 +118,7 @@ def reproduce(
 def _run(
     experiment: str, config: RunConfig, command: Command, progress: Progress | None, executors: Executors | None
 ) -> RunResult:
-    result = execute(config, command, progress=progress, executors=executors)
+    result = execute(config, command=command, progress=progress, executors=executors)
     if error := result.summary.get("error"):
         raise RunError(f"{experiment}: {error}")
     return result

@@ -81,7 +81,7 @@ SLOW_KINDS = {
 
 
 def computed(words: list[str]) -> RunResult:
-    return execute(compose(words), Command.of(words))
+    return execute(compose(words), command=Command.of(words))
 
 
 def page_of(directory: Path) -> Page:
