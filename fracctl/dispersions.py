@@ -61,7 +61,7 @@ class Distribution:
         return float(random.choice(np.array(self.numbers)))
 
 
-def check_names(dispersions: Mapping[str, Distribution], known: Collection[str]) -> None:
+def check_names(dispersions: Collection[str], known: Collection[str]) -> None:
     """Raise ArgumentError unless all that is dispersed is known."""
     for wrong in set(dispersions) - set(known):
         raise ArgumentError("dispersions", wrong, f"must be one of {', '.join(known)}{suggestion(wrong, known)}")

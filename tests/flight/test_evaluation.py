@@ -247,6 +247,21 @@ def test_truth_with_drag_on_followers_of_their_own() -> None:
     assert len(set(of(rows, "pd", "dispersed")["follower_ballistic_m2_kg"].tolist())) == 3
 
 
+def test_truth_with_j2_and_drag_about_leaders_of_their_own() -> None:
+    found = build_checked(
+        compose(["experiment=flight_leo", *SMALL[1:], *ONE, "evaluation.stages=[nonlinear,dispersed]"])
+    )[0]
+    assert isinstance(found, FlightEvaluation)
+    assert {"density_factor", "eccentricity", "argument_of_latitude_deg"} <= set(found.around.dispersions)
+    rows = found(all_points(found))
+    flown = of(rows, "published_pd", "dispersed")
+    assert set(flown["status"].tolist()) <= {"ok", "unsettled"}
+    assert len(set(flown["argument_of_latitude_deg"].tolist())) == 3
+    alone = found.fly("ic1", samples=[1], design={"law_number": 0.0})
+    together = found.fly("ic1", samples=[0, 1, 2], design={"law_number": 0.0})
+    np.testing.assert_array_equal(alone.at_samples[0], together.at_samples[1])
+
+
 REFUSED = [
     (["evaluation.stages=[ideal,tested]"], "evaluation.stages = tested: must be among ideal"),
     (["evaluation.band_m=55"], "evaluation.band_m = 55: must be one of the measured bands"),
