@@ -13,7 +13,7 @@ from fracctl.arrays import Array, Floats, joined
 from fracctl.dispersions import SAMPLE
 from fracctl.errors import ArgumentError, UnsupportedError, suggestion
 from fracctl.evaluation import COUNTERS, LAW_NUMBER, Conclusion, Evaluation
-from fracctl.flight import beside, conclusion
+from fracctl.flight import beside, conclusion, history
 from fracctl.flight.implementations import IMPLEMENTATIONS, Implementations
 from fracctl.flight.measured import measured, names, takes
 from fracctl.flight.names import CERTAIN, STAGES, Stage
@@ -70,6 +70,7 @@ class FlightEvaluation(Evaluation):
         if self.plant.scales is None:
             raise ArgumentError("plant", self.plant, "must have units for flights; set plant.scales")
         check_laws(self.laws, self.plant.components)
+        history.check(self.sampling.history_orbits, self.around.truth)
         for stage in self.stages:
             if stage not in STAGES:
                 allowed = f"must be among {', '.join(STAGES)}{suggestion(stage, STAGES)}"
@@ -189,6 +190,7 @@ class FlightEvaluation(Evaluation):
                     yield at, self._measured(self._flown(controller, met, points.samples[at]), condition)
 
     def _flown(self, controller: DiscreteController, met: Flown, samples: Floats) -> SampledTrajectory:
+        numbers = [int(sample) for sample in samples]
         return simulate(
             met.plant,
             controller,
@@ -197,8 +199,17 @@ class FlightEvaluation(Evaluation):
             actuator=met.actuator,
             navigation=met.navigation,
             anti_windup=self.sampling.anti_windup,
+            earlier=history.recorded(
+                met.plant,
+                met.states,
+                met.navigation,
+                controller.period,
+                self.sampling.history_orbits,
+                self.seed + _NOISE,
+                numbers,
+            ),
             seed=self.seed + _NOISE,
-            numbers=[int(sample) for sample in samples],
+            numbers=numbers,
         )
 
     def fly(
