@@ -93,7 +93,7 @@ class Distribution:
         return float(np.clip(mean + deviation * ndtri(random.uniform(first, last)), low, high))
 
 
-def check_names(dispersions: Mapping[str, Distribution], known: Collection[str]) -> None:
+def check_names(dispersions: Collection[str], known: Collection[str]) -> None:
     """Raise ArgumentError unless all that is dispersed is known."""
     for wrong in set(dispersions) - set(known):
         raise ArgumentError("dispersions", wrong, f"must be one of {', '.join(known)}{suggestion(wrong, known)}")

@@ -166,6 +166,8 @@ class FlightEvaluation(Typed):
     memory_tolerance: Annotated[Number, Field(gt=0.0, lt=1.0)] = 0.01
     memory_samples: Annotated[Whole, Field(ge=2)] | None = None
     anti_windup: Literal["none", "hold_integrals", "restart"] = "none"
+    history_orbits: Annotated[Number, Field(ge=0.0, le=10.0)] = 0.0
+    """Of free drift before switch-on, measured as the flight is, which the memory knows."""
     navigation: NavigationOptions = NavigationOptions()
     thrusters: ThrusterOptions = ThrusterOptions()
     largest_control: Positive = None

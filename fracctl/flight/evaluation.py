@@ -13,7 +13,7 @@ from fracctl.arrays import Array, Floats, joined
 from fracctl.dispersions import SAMPLE
 from fracctl.errors import ArgumentError, UnsupportedError, suggestion
 from fracctl.evaluation import COUNTERS, LAW_NUMBER, Conclusion, Evaluation
-from fracctl.flight import conclusion, single_flights, uncertain
+from fracctl.flight import conclusion, history, single_flights, uncertain
 from fracctl.flight import rows as rows_of
 from fracctl.flight.implementations import IMPLEMENTATIONS, Implementations
 from fracctl.flight.measured import names, takes
@@ -73,6 +73,7 @@ class FlightEvaluation(Evaluation):
                 "plant", type(self.plant).__name__, "must have units for flights", "set plant.scales, or take plant=hcw"
             )
         check_laws(self.laws, self.plant.components)
+        history.check(self.sampling.history_orbits, self.around.truth)
         for stage in self.stages:
             if stage not in STAGES:
                 allowed = f"must be among {', '.join(STAGES)}{suggestion(stage, STAGES)}"
@@ -198,6 +199,7 @@ class FlightEvaluation(Evaluation):
         return self.around.of(stage, self.initial_conditions[condition], drawn, count, self.sizes.get(condition))
 
     def _flown(self, controller: DiscreteController, met: Flown, samples: Floats) -> SampledTrajectory:
+        numbers = [int(sample) for sample in samples]
         return simulate(
             met.plant,
             controller,
@@ -206,8 +208,17 @@ class FlightEvaluation(Evaluation):
             actuator=met.actuator,
             navigation=met.navigation,
             anti_windup=self.sampling.anti_windup,
+            earlier=history.recorded(
+                met.plant,
+                met.states,
+                met.navigation,
+                controller.period,
+                self.sampling.history_orbits,
+                self.seed + _NOISE,
+                numbers,
+            ),
             seed=self.seed + _NOISE,
-            numbers=[int(sample) for sample in samples],
+            numbers=numbers,
         )
 
     def fly(

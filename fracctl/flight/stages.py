@@ -47,6 +47,8 @@ class Sampling:
     """Length of a window, in its place."""
     anti_windup: AntiWindup = "none"
     """What a limit does to the memory."""
+    history_orbits: float = 0.0
+    """Of free drift before switch-on, whose measurements the memory knows; it begins at switch-on with 0."""
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.period_s) and self.period_s > 0.0):

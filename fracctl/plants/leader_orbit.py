@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from fracctl.arrays import Floats
+from fracctl.arrays import Array, Floats
 from fracctl.compiling import compiled_with
 from fracctl.errors import UnsupportedError
 
@@ -72,11 +74,16 @@ class LeaderOrbit:
     def __call__(self, t: Floats) -> Floats:
         """Return y at times (b,) from 0 on, (b, 6)."""
         times = np.ascontiguousarray(t)
-        while len(self._turns) * _TURN <= times.max(initial=0.0):
-            self._turn()
+        self.until(times.max(initial=0.0))
         out = np.empty((len(times), STATES))
         _evaluate(self._table, self._pieces / _TURN, times, out)
         return out
+
+    def until(self, time: float) -> tuple[Floats, float]:
+        """Return the coefficients of the pieces from 0 to beyond a time, (pieces, nodes, 6), and pieces in 1/n."""
+        while len(self._turns) * _TURN <= time:
+            self._turn()
+        return self._table, self._pieces / _TURN
 
     def nodal_period(self) -> float:
         """Return the time between the first two passages of the ascending node from time 0 on.
@@ -117,6 +124,55 @@ class LeaderOrbit:
         values = run.y.T[:-1].reshape(self._pieces, _NODES, STATES)
         self._turns.append(np.einsum("kq,pqn->pkn", self._fit, values))
         self._table = np.ascontiguousarray(np.concatenate(self._turns))
+
+
+class LeaderOrbits:
+    """The orbits of b leaders, one a member; or of one that all members share.
+
+    Args:
+        orbits: of the leaders.
+    """
+
+    def __init__(self, orbits: Sequence[LeaderOrbit]) -> None:
+        self._orbits, self._known = tuple(orbits), -1.0
+        self._tables, self._densities = np.empty((0, 0, _NODES, STATES)), np.empty(0)
+
+    def take(self, rows: Array) -> LeaderOrbits:
+        """Return those of some members."""
+        return self if len(self._orbits) == 1 else LeaderOrbits([self._orbits[row] for row in rows])
+
+    def __call__(self, t: Floats) -> Floats:
+        """Return y of each member at its time, (b,) from 0 on, (b, 6)."""
+        if len(self._orbits) == 1:
+            return self._orbits[0](t)
+        times = np.ascontiguousarray(t)
+        if (last := float(times.max(initial=0.0))) > self._known:
+            self._gather(last)
+        out = np.empty((len(times), STATES))
+        _evaluate_each(self._tables, self._densities, times, out)
+        return out
+
+    def _gather(self, last: float) -> None:
+        found = [orbit.until(last) for orbit in self._orbits]
+        longest = max(len(table) for table, _ in found)
+        self._tables = np.zeros((len(found), longest, _NODES, STATES))
+        for place, (table, _) in enumerate(found):
+            self._tables[place, : len(table)] = table
+        self._densities = np.array([density for _, density in found])
+        self._known = float(min(len(table) / density for table, density in found)) * (1.0 - 1e-12)
+
+
+@lru_cache(maxsize=2048)
+def leader_orbit(*numbers: float) -> LeaderOrbit:
+    """Return the orbit of `LeaderOrbit`'s arguments, integrated once for all laws that fly about it."""
+    return LeaderOrbit(*numbers)
+
+
+@compiled_with(error_model="numpy")
+def _evaluate_each(tables: Floats, densities: Floats, times: Floats, out: Floats) -> None:
+    """Write y at the times, of member i from its own pieces."""
+    for i in range(len(times)):
+        _evaluate(tables[i], densities[i], times[i : i + 1], out[i : i + 1])
 
 
 @compiled_with(error_model="numpy")

@@ -11,12 +11,13 @@ from numpy.typing import ArrayLike
 
 from fracctl.arrays import Array, Floats, finite
 from fracctl.compiling import compiled_with
+from fracctl.dispersions import check_names
 from fracctl.elements import Elements
 from fracctl.errors import ArgumentError
 from fracctl.plants.capabilities import of_rows
 from fracctl.plants.function import FunctionPlant
 from fracctl.plants.hcw import Chief
-from fracctl.plants.leader_orbit import LeaderOrbit
+from fracctl.plants.leader_orbit import LeaderOrbit, LeaderOrbits, leader_orbit
 from fracctl.plants.relative_motion import checked_phase
 from fracctl.plants.state import SecondOrder
 from fracctl.units import EARTH_RADIUS_KM
@@ -56,7 +57,13 @@ class PerturbedRelativeMotion(SecondOrder):
     """
 
     components = ("x", "y", "z")
-    dispersed = ("follower_ballistic_m2_kg",)
+    dispersed = (
+        "follower_ballistic_m2_kg",
+        "density_factor",
+        "eccentricity",
+        "true_anomaly_deg",
+        "argument_of_latitude_deg",
+    )
     """What `dispersed_by` takes."""
 
     def __init__(
@@ -91,9 +98,17 @@ class PerturbedRelativeMotion(SecondOrder):
         self._drag = 0.5 * density_kg_m3 * 1e3 * a_km
         drags = [self._drag * ballistic for ballistic in (leader_ballistic_m2_kg, follower_ballistic_m2_kg)]
         self._constants = np.array([[oblateness, *drags, height]])
-        angles = (self.leader.inclination_deg, self.leader.argument_of_latitude_deg, self.true_anomaly_deg)
+        argument = self.leader.argument_of_latitude_deg
+        self._orbit = self._leader_orbit(self.eccentricity, self.true_anomaly_deg, argument, drags[0])
+        self._orbits = LeaderOrbits([self._orbit])
+
+    def _leader_orbit(
+        self, eccentricity: float, true_anomaly_deg: float, argument_of_latitude_deg: float, drag: float
+    ) -> LeaderOrbit:
+        oblateness, _, _, height = self._constants[0].tolist()
+        angles = (self.leader.inclination_deg, argument_of_latitude_deg, true_anomaly_deg)
         inclination, argument, anomaly = (math.radians(angle) for angle in angles)
-        self._orbit = LeaderOrbit(self.eccentricity, inclination, argument, oblateness, drags[0], height, anomaly)
+        return leader_orbit(eccentricity, inclination, argument, oblateness, drag, height, anomaly)
 
     @property
     def chief_elements(self) -> Elements:
@@ -115,23 +130,40 @@ class PerturbedRelativeMotion(SecondOrder):
         """
         return self._orbit.nodal_period()
 
-    def dispersed_by(self, follower_ballistic_m2_kg: ArrayLike) -> PerturbedRelativeMotion:
-        """Return the plant of b followers of their own C_D A/m in m²/kg, (b,).
+    def dispersed_by(self, **numbers: ArrayLike) -> PerturbedRelativeMotion:
+        """Return the plant of b members, about leaders of their own where these differ; what is not given stays.
+
+        Args:
+            numbers: by the names of `dispersed`, (b,) each: C_D A/m of the followers in m²/kg; a factor on the density,
+                for leader and follower; e, true anomaly and argument of latitude of the leaders at time 0.
 
         Raises:
-            ArgumentError: one is negative.
+            ArgumentError: a name is another, a number negative, or an orbit not an ellipse.
         """
-        given = np.atleast_1d(finite("follower_ballistic_m2_kg", follower_ballistic_m2_kg))
-        if (given < 0.0).any():
-            raise ArgumentError("follower_ballistic_m2_kg", float(given.min()), "must not be negative")
+        check_names(numbers, self.dispersed)
+        given = {name: np.atleast_1d(finite(name, values)) for name, values in numbers.items()}
+        for name in ("follower_ballistic_m2_kg", "density_factor"):
+            if (given.get(name, np.zeros(1)) < 0.0).any():
+                raise ArgumentError(name, float(given[name].min()), "must not be negative")
+        b = np.broadcast_shapes(*(values.shape for values in given.values()))[0] if given else 1
         other = copy.copy(self)
-        other._constants = np.repeat(self._constants, len(given), axis=0)
-        other._constants[:, 2] = self._drag * given
+        other._constants = np.repeat(self._constants[:1], b, axis=0)
+        if "follower_ballistic_m2_kg" in given:
+            other._constants[:, 2] = self._drag * given["follower_ballistic_m2_kg"]
+        other._constants[:, 1:3] *= np.reshape(given.get("density_factor", 1.0), (-1, 1))
+        if set(given) - {"follower_ballistic_m2_kg"}:
+            nominal = (self.eccentricity, self.true_anomaly_deg, self.leader.argument_of_latitude_deg)
+            names = ("eccentricity", "true_anomaly_deg", "argument_of_latitude_deg")
+            columns = [np.broadcast_to(given.get(name, value), b) for name, value in zip(names, nominal, strict=True)]
+            rows = zip(*(column.tolist() for column in columns), other._constants[:, 1].tolist(), strict=True)
+            other._orbits = LeaderOrbits(
+                [self._leader_orbit(*checked_phase(e, anomaly), argument, drag) for e, anomaly, argument, drag in rows]
+            )
         return other
 
     @property
     def batch(self) -> int | None:
-        """Batch size, None where all members share the followers' coefficient."""
+        """Batch size, None where all members share leader and drag."""
         return len(self._constants) if len(self._constants) > 1 else None
 
     def take(self, rows: Array) -> PerturbedRelativeMotion:
@@ -139,16 +171,17 @@ class PerturbedRelativeMotion(SecondOrder):
         if self.batch is None:
             return self
         other = copy.copy(self)
-        other._constants = self._constants[rows]
+        other._constants, other._orbits = self._constants[rows], self._orbits.take(rows)
         return other
 
     def leader_motion(self, t: Floats) -> Floats:
         """Return r, r', h and the polar axis in the leader's frame at times (b,) from 0 on, (b, 6)."""
-        return self._orbit(t)
+        return self._orbits(t)
 
     def rates(self, t: Floats, x: Floats, u: Floats) -> Floats:
         """Return x' of x = [x, y, z, x', y', z'], (b, 6)."""
-        return _rates(self._orbit(t), x, u, of_rows(self._constants, len(x)))
+        constants = of_rows(self._constants, len(x))
+        return _rates(self._orbits(t), x, u, constants)
 
     def jacobians(self, t: Floats, x: Floats, u: Floats) -> tuple[Floats, Floats]:
         """Return ∂f/∂x, (b, 6, 6), and ∂f/∂u, (b, 6, 3), by differences of fourth order."""

@@ -13,13 +13,16 @@ from fracctl.config.compose import compose
 from fracctl.errors import ArgumentError, ConfigurationError
 from fracctl.execution.run import execute
 from fracctl.flight import FlightEvaluation
+from fracctl.flight.history import recorded
 from fracctl.flight.implementations import Implementations
 from fracctl.measures import settling_time
 from fracctl.measures.settling_times import SettlingTimes
 from fracctl.plants import HCW
 from fracctl.plants.relative_motion import RelativeMotion
 from fracctl.sampled import (
+    Navigation,
     SampledLaw,
+    Window,
     delta_v,
     dimensionless_time,
     memory_for,
@@ -270,7 +273,58 @@ def test_truth_with_drag_on_followers_of_their_own() -> None:
     assert len(set(of(rows, "pd", "dispersed")["follower_ballistic_m2_kg"].tolist())) == 3
 
 
+def test_truth_with_j2_and_drag_about_leaders_of_their_own() -> None:
+    found = build_checked(
+        compose(["experiment=flight_leo", *SMALL[1:], *ONE, "evaluation.stages=[nonlinear,dispersed]"])
+    )[0]
+    assert isinstance(found, FlightEvaluation)
+    assert {"density_factor", "eccentricity", "argument_of_latitude_deg"} <= set(found.around.dispersions)
+    rows = found(all_points(found))
+    flown = of(rows, "published_pd", "dispersed")
+    assert set(flown["status"].tolist()) <= {"ok", "unsettled"}
+    assert len(set(flown["argument_of_latitude_deg"].tolist())) == 3
+    alone = found.fly("ic1", samples=[1], design={"law_number": 0.0})
+    together = found.fly("ic1", samples=[0, 1, 2], design={"law_number": 0.0})
+    np.testing.assert_array_equal(alone.at_samples[0], together.at_samples[1])
+
+
+def test_a_memory_may_know_the_drift_before_switch_on() -> None:
+    plant, start = HCW(), np.array([[-1e-3, 2e-3, 0.0, 1e-4, 2e-3, 2e-3]])
+    for truth in (plant, RelativeMotion(HCW().chief, 0.1, 30.0)):
+        before = recorded(truth, start, None, 0.1, 0.5, 0, [0])
+        assert before is not None
+        count = round(0.5 * TURN / 0.1)
+        assert before.shape == (1, count, 6)
+        free = SampledLaw(fc.controllers.PD(np.zeros((3, 3)), np.zeros((3, 3))), Window(2), 0.1)
+        if truth is plant:
+            drift = simulate(plant, free, before[0, 0], count * 0.1)
+            np.testing.assert_allclose(drift.states[-1], start[0], atol=1e-12)
+            np.testing.assert_allclose(drift.states[:-1], before[0], atol=1e-12)
+    assert recorded(plant, start, None, 0.1, 0.0, 0, [0]) is None
+    noisy = recorded(plant, np.repeat(start, 50, axis=0), Navigation(1e-4, 0.0), 0.1, 0.5, 3, range(50))
+    clean = recorded(plant, start, None, 0.1, 0.5, 0, [0])
+    assert noisy is not None
+    assert clean is not None
+    np.testing.assert_allclose((noisy - clean)[..., :3].std(), 1e-4, rtol=0.05)
+    np.testing.assert_array_equal((noisy - clean)[..., 3:], 0.0)
+
+
+def test_a_recorded_history_matters_to_laws_with_memory_alone() -> None:
+    words = [*ONE, "evaluation.stages=[sampled,dispersed]", "evaluation.navigation.position_noise_m=0"]
+    short, known = (built([*words, f"evaluation.history_orbits={orbits}"]) for orbits in (0, 0.3))
+    for law, same in ((0.0, True), (1.0, False)):
+        flights = [f.fly("ic1", "sampled", design={"law_number": law}).commands for f in (short, known)]
+        assert np.array_equal(*flights) is same
+    alone = known.fly("ic1", samples=[1], design={"law_number": 1.0})
+    together = known.fly("ic1", samples=[0, 1], design={"law_number": 1.0})
+    np.testing.assert_array_equal(alone.at_samples[0], together.at_samples[1])
+
+
 REFUSED = [
+    (
+        ["evaluation.truth.type=perturbed_relative_motion", "evaluation.history_orbits=1"],
+        "evaluation.history_orbits = 1",
+    ),
     (["evaluation.stages=[ideal,tested]"], "evaluation.stages = tested: must be among ideal"),
     (["evaluation.band_m=55"], "evaluation.band_m = 55: must be one of the measured bands"),
     (["~evaluation.band_m.ic1_tenth"], "must hold a band for ic1_"),

@@ -85,6 +85,44 @@ def test_two_satellites_in_inertial_axes(e: float) -> None:
         np.testing.assert_allclose(state[3:] * A_KM / UNIT_S, rate, rtol=0, atol=1e-11)
 
 
+def test_members_fly_about_leaders_of_their_own() -> None:
+    """A member of a batch has the rates of a plant that is made for it alone, over three orbits."""
+    common = {"density_kg_m3": 1e-11, "scale_height_km": 45.0, "leader_ballistic_m2_kg": 0.008}
+    drawn = {
+        "eccentricity": [0.0, 0.01, 0.05],
+        "true_anomaly_deg": [10.0, 200.0, 80.0],
+        "argument_of_latitude_deg": [0.0, 120.0, -30.0],
+        "density_factor": [0.5, 1.0, 3.0],
+        "follower_ballistic_m2_kg": [0.01, 0.02, 0.03],
+    }
+    batch = PerturbedRelativeMotion(at(40.0), 0.001, 0.0, **common).dispersed_by(**drawn)
+    state = np.array([2.0, -1.0, 0.5, 0.0, -3.0, 1.0]) / A_KM * np.array([[1.0], [2.0], [3.0]])
+    control = np.full((3, 3), 1e-3)
+    for time in (0.0, 0.7 * TURN, 2.9 * TURN):
+        found = batch.rates(np.full(3, time), state, control)
+        for i, (e, anomaly, argument, factor, ballistic) in enumerate(zip(*drawn.values(), strict=True)):
+            own = {**common, "density_kg_m3": factor * 1e-11, "follower_ballistic_m2_kg": ballistic}
+            alone = PerturbedRelativeMotion(at(argument), e, anomaly, **own)
+            expected = alone.rates(np.array([time]), state[i : i + 1], control[:1])
+            np.testing.assert_allclose(found[i : i + 1], expected, rtol=1e-11, atol=1e-13)
+
+
+def test_what_is_not_given_stays() -> None:
+    plant = PerturbedRelativeMotion(at(40.0), 0.01, 30.0, density_kg_m3=1e-11)
+    state, control = np.full((2, 6), 1e-4), np.zeros((2, 3))
+    expected = plant.rates(np.full(2, 1.0), state, control)
+    for same in ({"density_factor": [1.0, 1.0]}, {"eccentricity": [0.01, 0.01]}, {"true_anomaly_deg": [30.0, 30.0]}):
+        found = plant.dispersed_by(**same).rates(np.full(2, 1.0), state, control)
+        np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-15)
+    for wrong, sentence in (
+        ({"density_factor": [-1.0]}, "`density_factor` must not be negative"),
+        ({"eccentricity": [1.0]}, "`eccentricity` must lie in"),
+        ({"anomaly": [1.0]}, "must be one of follower_ballistic_m2_kg"),
+    ):
+        with pytest.raises(ArgumentError, match=sentence):
+            plant.dispersed_by(**wrong)
+
+
 def test_nodal_period() -> None:
     """T = 2π √(a³/GM) [1 - 3/2 J2 (R/a)² (4 cos² i - 1)] of the mean a, which the energy averaged over an orbit gives.
 
