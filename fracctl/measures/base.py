@@ -94,7 +94,7 @@ def check_kind(name: str, wanted: str | None, trajectory: object) -> None:
 
 
 def _measures_of(trajectories: str) -> Iterator[str]:
-    measures = import_module("fracctl.measures")  # the room itself, which lists this module's classes among others
+    measures = import_module(__package__)  # the room itself, which lists what stands in it
     for name in measures.__all__:
         found = getattr(measures, name)
         if isinstance(found, type) and issubclass(found, OfTrajectories) and trajectories_of(found) == trajectories:

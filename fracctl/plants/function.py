@@ -28,6 +28,7 @@ class FunctionPlant:
         events: what ends a run, or is recorded in it.
         jacobians: takes what f takes and returns ∂f/∂x (b, n, n) and ∂f/∂u (b, n, m); None for differences of fourth
             order, with errors near 1e-12.
+        smooth: whether f has many derivatives in t and x, so that error estimates may count on the order of a solver.
 
     Raises:
         ArgumentError: a number is not positive, the names do not fit, or f returns another shape (when it is called).
@@ -42,6 +43,7 @@ class FunctionPlant:
         scales: Scales | None = None,
         events: Sequence[Event] = (),
         jacobians: Callable[[Floats, Floats, Floats], tuple[Floats, Floats]] | None = None,
+        smooth: bool = False,
     ) -> None:
         for name, value in (("n_states", n_states), ("n_controls", n_controls)):
             if value < 1 or value != int(value):
@@ -52,7 +54,7 @@ class FunctionPlant:
             raise ArgumentError("state_names", self.state_names, f"must be {n_states} different names")
         self.n_states, self.n_controls = n_states, n_controls
         self.scales, self.events = scales, tuple(events)
-        self._f, self._jacobians = f, jacobians
+        self._f, self._jacobians, self.smooth = f, jacobians, smooth
 
     def rates(self, t: Floats, x: Floats, u: Floats) -> Floats:
         """Return f(t, x, u), (b, n).

@@ -13,6 +13,7 @@ from fracctl.controllers.delayed_feedback import DelayedLaw, DelayedTerm
 from fracctl.errors import ArgumentError, UnsupportedError
 from fracctl.loop import ClosedLoop, Need
 from fracctl.plants.capabilities import members_of
+from fracctl.plants.function import FunctionPlant
 from fracctl.solvers.control_events import ended_by_controls
 from fracctl.solvers.members import starting_states, whole
 from fracctl.solvers.method_of_steps_adaptive import AdaptiveRun
@@ -31,9 +32,11 @@ from fracctl.stepwise import Steps, StepwiseTrajectory
 
 _FEWEST = 4
 _SAFE_RATIO = 63.0
-"""Errors of N/2 and N steps differ by 2⁸ = 256 in the end; 2⁶ is already assumed to hold."""
+"""Errors of N/2 and N steps differ by 2⁸ = 256 in the end where all is smooth; 2⁶ is already assumed to hold."""
 _SAFE_RATIO_AT_KINKS = 1.0
 """Where a saturation sets in within a step the error is O(N⁻²) and not regular."""
+_SAFE_RATIO_AT_JUMPS = 0.25
+"""Where the plant itself may jump within a step, errors of N/2 and N steps can be alike, and their difference small."""
 _GOAL = 1e-6
 """Errors above it, or above the tolerance, are worth steps of a member's own."""
 _SMOOTH, _JUMP = 1e-7, 0.1
@@ -51,7 +54,9 @@ class MethodOfSteps:
     With one delay τ the grid repeats itself after τ: delayed stages are stages of the step N steps earlier, on its
     continuous extension of order 7, so the error is O(N⁻⁸). With several delays the extension is looked up. Events of
     the plant are found on the extension. A saturation sets in within steps, which leaves O(N⁻²): about 1e-5 with 100
-    steps to an orbit and 1e-6 with 400. The error is estimated by a second run with half the steps.
+    steps to an orbit and 1e-6 with 400. The error is estimated by a second run with half the steps: from their
+    difference, divided by 2⁶ where the plant is smooth and nothing saturates, and times 4 for a `FunctionPlant` that
+    does not say that it is smooth.
 
     A member whose error is above 1e-6, or above the tolerance, because the motion is fast somewhere (a near pass) is
     computed again with steps of its own, chosen by the error of each; the others keep theirs. Not so under a
@@ -133,6 +138,9 @@ class _Problem:
 
     def __init__(self, loop: ClosedLoop, start: Floats, horizon: float, count: int) -> None:
         self.plant, self.saturation = loop.plant, loop.saturation
+        self.ratio = _SAFE_RATIO if loop.saturation is None else _SAFE_RATIO_AT_KINKS
+        if isinstance(loop.plant, FunctionPlant) and not loop.plant.smooth:
+            self.ratio = _SAFE_RATIO_AT_JUMPS
         self.start, self.horizon, self.count = start, horizon, count
         self.terms = tuple(term.of(len(start)) for term in loop.delayed_terms)
         self.law = law = loop.controller
@@ -145,7 +153,7 @@ class _Problem:
         steps, terms = self._on_even_steps(self.count, watch)
         coarse, _ = self._on_even_steps(self.count // 2, Watch((), watch.end))
         error = _difference(steps, coarse, watch.end, self.horizon)
-        return steps, terms, watch, error / (_SAFE_RATIO if self.saturation is None else _SAFE_RATIO_AT_KINKS)
+        return steps, terms, watch, error / self.ratio
 
     def _on_even_steps(self, count: int, watch: Watch) -> tuple[Steps, tuple[DelayedTerm, ...]]:
         terms = tuple(replace(t, schedule=RenewedGain(t)) if t.on_segment is not None else t for t in self.terms)
@@ -192,7 +200,7 @@ class _Problem:
         watch = Watch(self.plant.events, np.where(first.diverged(self.horizon), first.end, latest))
         steps = run(plant, terms, None, history, halved(rough.edges), start, watch)
         watch.look_at_rest(steps)
-        return steps, watch, _difference(steps, rough, watch.end, self.horizon) / _SAFE_RATIO
+        return steps, watch, _difference(steps, rough, watch.end, self.horizon) / self.ratio
 
     def withdraw_doubtful(self, steps: Steps, watch: Watch, error: Floats) -> None:
         """End inaccurate members before a step whose highest power is of the order of the largest state."""

@@ -136,7 +136,7 @@ def test_order_is_eight(case: str) -> None:
     rate, gain, delay = complex(-0.05, 1.3), 0.6, 2.0 * np.pi
     a = rate + gain * (1.0 - np.exp(-rate * delay)) * (case != "no memory")
     matrix = np.array([[a.real, -a.imag], [a.imag, a.real]])
-    plant = FunctionPlant(lambda t, x, u: x @ matrix.T + u, 2, 2)
+    plant = FunctionPlant(lambda t, x, u: x @ matrix.T + u, 2, 2, smooth=True)
 
     def wave(times: np.ndarray) -> np.ndarray:
         z = np.exp(rate * times)
@@ -158,7 +158,7 @@ def test_order_is_eight(case: str) -> None:
 def test_stages_and_extension_meet_their_order_conditions() -> None:
     """Σ_j a_ij = c_i; the extension reproduces polynomials of degree seven from their slopes."""
     np.testing.assert_allclose(COMBINE[:, 1:].sum(axis=1), NODES, atol=1e-13)
-    plant = FunctionPlant(lambda t, x, u: 7.0 * (t[:, None] - 0.3) ** 6 + 0.0 * x, 1, 1)
+    plant = FunctionPlant(lambda t, x, u: 7.0 * (t[:, None] - 0.3) ** 6 + 0.0 * x, 1, 1, smooth=True)
     trajectory = MethodOfSteps(8).solve(ClosedLoop(plant), [0.0], 2.0)
     t = np.linspace(0.0, 2.0, 33)
     np.testing.assert_allclose(trajectory(t)[:, 0], (t - 0.3) ** 7 + 0.3**7, atol=1e-12)
@@ -299,6 +299,23 @@ def test_a_tolerance_tells_failures_apart() -> None:
     loop = ClosedLoop(RotatingEllipsoid())
     fine = solve(loop, [0.0, 1.0, 1.9, 0.0], 20.0, solver="method_of_steps", tolerance=1e-6)
     assert list(fine.status) == ["ok"]
+
+
+@pytest.mark.parametrize("count", [50, 100, 200, 400])
+def test_errors_of_a_plant_that_jumps_are_below_their_estimates(count: int) -> None:
+    """x'' = -sign x from 1 at rest: parabolas, each quarter of the period √2 long."""
+
+    def rates(t: np.ndarray, x: np.ndarray, u: np.ndarray) -> np.ndarray:
+        return np.stack([x[:, 1], -np.sign(x[:, 0]) + 0.0 * u[:, 0]], axis=1)
+
+    trajectory = MethodOfSteps(count).solve(ClosedLoop(FunctionPlant(rates, 2, 1)), [1.0, 0.0], 40.0)
+    t, quarter = np.linspace(0.0, 40.0, 1001), np.sqrt(2.0)
+    halves, phase = np.divmod(t + quarter, 2.0 * quarter)
+    exact = (-1.0) ** halves * (1.0 - 0.5 * (phase - quarter) ** 2)
+    error = np.abs(trajectory(t)[:, 0] - exact).max()
+    assert error < trajectory.error_estimate[0] < 100.0 * error
+    told = MethodOfSteps(count).solve(ClosedLoop(FunctionPlant(rates, 2, 1, smooth=True)), [1.0, 0.0], 40.0)
+    assert told.error_estimate[0] < 0.1 * error, "the estimate of a smooth plant is no bound for this one"
 
 
 @pytest.mark.parametrize(
