@@ -49,7 +49,7 @@ def test_the_package_works_where_no_kernel_can_be_stored() -> None:
     code = """
 from numba.core import caching
 caching.CompileResultCacheImpl._locator_classes = []
-import fracctl.characteristic, fracctl.measures, fracctl.solvers.contour, fracctl.solvers.volterra
+import fracctl.characteristic, fracctl.measures, fracctl.solvers.contour.solver, fracctl.solvers.volterra.solver
 """
     subprocess.run([sys.executable, "-c", code], check=True, timeout=60.0)
 

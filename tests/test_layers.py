@@ -74,7 +74,7 @@ def imported_names(tree: ast.AST) -> Iterator[tuple[int, str]]:
 
 
 def room(dotted: str) -> str | None:
-    """`fracctl.solvers.contour` lies in `solvers`; the package itself and other packages lie in none."""
+    """`fracctl.solvers.contour.solver` lies in `solvers`; the package itself and other packages lie in none."""
     parts = dotted.split(".")
     return parts[1] if parts[0] == "fracctl" and len(parts) > 1 and parts[1] in existing_rooms() else None
 

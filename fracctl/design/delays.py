@@ -14,7 +14,7 @@ from fracctl.errors import ArgumentError, UnsupportedError
 from fracctl.loop import ClosedLoop
 from fracctl.plants.capabilities import SectionedPlant, period_of
 from fracctl.plants.state import Section, StatePlant
-from fracctl.solvers.method_of_steps import MethodOfSteps
+from fracctl.solvers.method_of_steps.solver import MethodOfSteps
 from fracctl.stepwise import Steps, StepwiseTrajectory
 
 _IN_A_STEP = 8

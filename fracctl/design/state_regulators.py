@@ -23,7 +23,7 @@ from fracctl.errors import ArgumentError
 from fracctl.fractional.collocation import chebyshev_nodes
 from fracctl.loop import ClosedLoop
 from fracctl.plants.state import StatePlant
-from fracctl.solvers.method_of_steps import MethodOfSteps
+from fracctl.solvers.method_of_steps.solver import MethodOfSteps
 from fracctl.stability.periodic_orbits import PeriodicOrbit
 
 _FEWEST = 8

@@ -12,12 +12,12 @@ from fracctl.solvers.base import SolvedMembers, Solver
 from fracctl.solvers.solve import solve
 
 if TYPE_CHECKING:
-    from fracctl.solvers.collocation import Collocation
-    from fracctl.solvers.contour import Contour
-    from fracctl.solvers.explicit_memory import ExplicitMemory
-    from fracctl.solvers.implicit_memory import ImplicitMemory
-    from fracctl.solvers.method_of_steps import MethodOfSteps
-    from fracctl.solvers.volterra import Volterra
+    from fracctl.solvers.collocation.solver import Collocation
+    from fracctl.solvers.contour.solver import Contour
+    from fracctl.solvers.explicit_memory.solver import ExplicitMemory
+    from fracctl.solvers.implicit_memory.solver import ImplicitMemory
+    from fracctl.solvers.method_of_steps.solver import MethodOfSteps
+    from fracctl.solvers.volterra.solver import Volterra
 
 __all__ = [
     "Collocation",

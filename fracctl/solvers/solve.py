@@ -14,7 +14,7 @@ from fracctl.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from fracctl.meshwise import MeshTrajectory
-    from fracctl.solvers.explicit_memory import ExplicitMemory
+    from fracctl.solvers.explicit_memory.solver import ExplicitMemory
     from fracctl.stepwise import StepwiseTrajectory
 
 _SOLVERS = {
@@ -100,11 +100,11 @@ def solve(
         UnsupportedError: the solver does not take this loop.
     """
     if solver == "method_of_steps":
-        from fracctl.solvers.method_of_steps import MethodOfSteps
+        from fracctl.solvers.method_of_steps.solver import MethodOfSteps
 
         return MethodOfSteps(tolerance=tolerance or 0.0).solve(loop, initial_state, horizon)
     if solver == "implicit_memory":
-        from fracctl.solvers.implicit_memory import ImplicitMemory
+        from fracctl.solvers.implicit_memory.solver import ImplicitMemory
 
         return ImplicitMemory(tolerance=tolerance or 0.0).solve(loop, initial_state, horizon)
     if solver not in _SOLVERS:

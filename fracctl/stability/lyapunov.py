@@ -9,8 +9,8 @@ from fracctl.arrays import Floats, finite, positive
 from fracctl.errors import ArgumentError
 from fracctl.plants.state import StatePlant
 from fracctl.solvers.members import whole
-from fracctl.solvers.method_of_steps_mesh import Mesh
-from fracctl.solvers.method_of_steps_runs import run
+from fracctl.solvers.method_of_steps.mesh import Mesh
+from fracctl.solvers.method_of_steps.runs import run
 
 _DISTANCE = 1e-7
 """Between neighbours, over 1 + |x|: curvature changes its growth by as much, rounding by 1e-9."""

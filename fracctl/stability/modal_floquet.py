@@ -12,7 +12,7 @@ from fracctl.arrays import Array, Booleans, Complexes, Floats
 from fracctl.errors import ArgumentError, UnsupportedError
 from fracctl.fractional.sum_of_exponentials import sum_of_exponentials
 from fracctl.loop import ClosedLoop
-from fracctl.solvers.explicit_memory_law import signals
+from fracctl.solvers.explicit_memory.law import signals
 
 _SHORTEST, _LONGEST = 1e-4, 1e3
 """Over a period: what the kernel resolves, and what it remembers."""

@@ -14,7 +14,7 @@ from fracctl.arrays import Array, Complexes, Floats, finite
 from fracctl.errors import ArgumentError
 from fracctl.loop import ClosedLoop
 from fracctl.plants.state import StatePlant
-from fracctl.solvers.method_of_steps import MethodOfSteps
+from fracctl.solvers.method_of_steps.solver import MethodOfSteps
 from fracctl.stepwise import StepwiseTrajectory
 
 _ITERATIONS = 30

@@ -12,9 +12,9 @@ from fracctl.fractional.collocation import chebyshev_nodes
 from fracctl.fractional.sampled import grunwald_letnikov, l1
 from fracctl.fractional.sum_of_exponentials import sum_of_exponentials
 from fracctl.fractional.terms import FractionalTerm
-from fracctl.solvers.explicit_memory_history import History
-from fracctl.solvers.explicit_memory_law import signals
-from fracctl.solvers.explicit_memory_mesh import step_edges
+from fracctl.solvers.explicit_memory.history import History
+from fracctl.solvers.explicit_memory.law import signals
+from fracctl.solvers.explicit_memory.mesh import step_edges
 
 ORDERS = [0.01, 0.09, 0.3, 0.5, 0.7, 0.9, 0.99]
 RANGES = [(1e-10, 40.0), (1e-3, 1.0), (0.5, 0.5), (1.0, 1e6)]

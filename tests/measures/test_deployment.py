@@ -27,7 +27,7 @@ from fracctl.measures.tension import Tension
 from fracctl.measures.thruster_force import ThrusterForce
 from fracctl.meshwise import MeshTrajectory
 from fracctl.plants import FunctionPlant, Tether
-from fracctl.solvers.implicit_memory import ImplicitMemory
+from fracctl.solvers.implicit_memory.solver import ImplicitMemory
 
 TURN = 2.0 * np.pi
 HORIZON = 2.0 * TURN

@@ -27,8 +27,8 @@ from fracctl.fractional.series import short_time_series
 from fracctl.fractional.system import LinearFractionalSystem
 from fracctl.solvers import Collocation, Volterra
 from fracctl.solvers.members import Members
-from fracctl.solvers.volterra_panels import UniformPanels
-from fracctl.solvers.volterra_solution import Solution
+from fracctl.solvers.volterra.panels import UniformPanels
+from fracctl.solvers.volterra.solution import Solution
 from tests.references import loops
 from tests.references.laplace import QuickReference, Reference
 from tests.references.loops import Loop

@@ -6,9 +6,9 @@ import mpmath
 import numpy as np
 import pytest
 
-from fracctl.solvers.contour_lanes import LANES
-from fracctl.solvers.contour_own import own, own_powers, own_shapes, own_start
-from fracctl.solvers.contour_plan import make_plan
+from fracctl.solvers.contour.lanes import LANES
+from fracctl.solvers.contour.own import own, own_powers, own_shapes, own_start
+from fracctl.solvers.contour.plan import make_plan
 
 PLAN = make_plan(12.0, 3.0, 5.0, 0.0, 5e-10, 5)
 COUNT = LANES + 6

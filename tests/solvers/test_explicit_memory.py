@@ -19,9 +19,9 @@ from fracctl.loop import ClosedLoop
 from fracctl.plants import HCW, Event, FunctionPlant, HCWInPlane, HCWOutOfPlane, Libration, RelativeMotion
 from fracctl.plants.state import SecondOrder
 from fracctl.solvers import Contour, ExplicitMemory, MethodOfSteps, solve
-from fracctl.solvers.explicit_memory_law import signals
-from fracctl.solvers.explicit_memory_mesh import step_edges
-from fracctl.solvers.explicit_memory_run import Problem, run
+from fracctl.solvers.explicit_memory.law import signals
+from fracctl.solvers.explicit_memory.mesh import step_edges
+from fracctl.solvers.explicit_memory.run import Problem, run
 from fracctl.trajectory import Trajectory
 from tests.references import loops, poles
 from tests.references.laplace import QuickReference, Reference

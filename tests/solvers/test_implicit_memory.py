@@ -20,7 +20,7 @@ from fracctl.measures import length_overshoot, length_settling
 from fracctl.meshwise import MeshTrajectory
 from fracctl.plants import FunctionPlant, Libration, Tether
 from fracctl.plants.state import Event, SecondOrder
-from fracctl.solvers.implicit_memory import ImplicitMemory, graded_mesh, halved
+from fracctl.solvers.implicit_memory.solver import ImplicitMemory, graded_mesh, halved
 from tests.references.series import mittag_leffler
 
 TURN = 2.0 * math.pi

@@ -24,9 +24,9 @@ from fracctl.plants.capabilities import members_of
 from fracctl.plants.linear import LinearPlant
 from fracctl.plants.state import StatePlant
 from fracctl.solvers.base import SolvedMembers
-from fracctl.solvers.explicit_memory_law import highest_used, signals
-from fracctl.solvers.explicit_memory_mesh import step_edges
-from fracctl.solvers.explicit_memory_run import Problem, Run, run
+from fracctl.solvers.explicit_memory.law import highest_used, signals
+from fracctl.solvers.explicit_memory.mesh import step_edges
+from fracctl.solvers.explicit_memory.run import Problem, Run, run
 from fracctl.solvers.members import Members, common_batch, equal_orders, whole
 from fracctl.solvers.results import merged
 from fracctl.trajectory import Trajectory

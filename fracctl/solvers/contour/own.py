@@ -13,8 +13,8 @@ from scipy.special import rgamma
 
 from fracctl.arrays import Array, Floats
 from fracctl.fractional.terms import powers
-from fracctl.solvers.contour_lanes import LANES, lanes
-from fracctl.solvers.contour_plan import Plan, last_coefficients
+from fracctl.solvers.contour.lanes import LANES, lanes
+from fracctl.solvers.contour.plan import Plan, last_coefficients
 
 _PIECE = 0.25
 """Length of the pieces: few terms, and over each of them σ^e changes so little that no digits are lost."""

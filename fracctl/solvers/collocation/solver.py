@@ -20,7 +20,7 @@ from fracctl.fractional.system import LinearFractionalSystem
 from fracctl.panels import PanelGrid
 from fracctl.solvers.base import SolvedMembers
 from fracctl.solvers.batched import BatchSolver
-from fracctl.solvers.collocation_equations import FORMS, Equations
+from fracctl.solvers.collocation.equations import FORMS, Equations
 from fracctl.solvers.members import Members, whole
 from fracctl.solvers.outputs import Derivative, Values, values
 from fracctl.solvers.results import packed

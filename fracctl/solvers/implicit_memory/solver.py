@@ -18,8 +18,8 @@ from fracctl.meshwise import MeshTrajectory
 from fracctl.plants.capabilities import CompiledPlant
 from fracctl.plants.state import Event, StatePlant
 from fracctl.solvers.control_events import ended_by_controls
-from fracctl.solvers.implicit_memory_equations import Given
-from fracctl.solvers.implicit_memory_kernel import BRACKETED, UNRESOLVED, Path, march, room_for
+from fracctl.solvers.implicit_memory.equations import Given
+from fracctl.solvers.implicit_memory.kernel import BRACKETED, UNRESOLVED, Path, march, room_for
 from fracctl.solvers.members import starting_states
 
 _GROWTH = 15.0

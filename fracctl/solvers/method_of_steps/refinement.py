@@ -17,9 +17,9 @@ from fracctl.arrays import Array, Booleans, Floats
 from fracctl.controllers.delayed_feedback import DelayedTerm, History
 from fracctl.plants.state import StatePlant
 from fracctl.solvers import dop853
-from fracctl.solvers.method_of_steps_events import Watch
-from fracctl.solvers.method_of_steps_mesh import Mesh
-from fracctl.solvers.method_of_steps_runs import by_looking_up, one_step
+from fracctl.solvers.method_of_steps.events import Watch
+from fracctl.solvers.method_of_steps.mesh import Mesh
+from fracctl.solvers.method_of_steps.runs import by_looking_up, one_step
 from fracctl.stepwise import Steps
 
 _ALLOWED = 1e-12

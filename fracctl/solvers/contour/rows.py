@@ -9,7 +9,7 @@ import numpy as np
 
 from fracctl.arrays import Array, Floats
 from fracctl.compiling import helper, inlined
-from fracctl.solvers.contour_lanes import LANES, WIDTH, larger
+from fracctl.solvers.contour.lanes import LANES, WIDTH, larger
 
 
 @helper

@@ -13,7 +13,7 @@ from fracctl.controllers.delayed_feedback import DelayedTerm, GainFunction, Hist
 from fracctl.controllers.saturation import Saturation
 from fracctl.plants.state import StatePlant
 from fracctl.solvers import dop853
-from fracctl.solvers.method_of_steps_mesh import Mesh
+from fracctl.solvers.method_of_steps.mesh import Mesh
 from fracctl.stepwise import Steps
 
 Control = Callable[[int, Floats], Floats]

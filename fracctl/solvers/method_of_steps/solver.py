@@ -16,10 +16,10 @@ from fracctl.plants.capabilities import members_of
 from fracctl.plants.function import FunctionPlant
 from fracctl.solvers.control_events import ended_by_controls
 from fracctl.solvers.members import starting_states, whole
-from fracctl.solvers.method_of_steps_adaptive import AdaptiveRun
-from fracctl.solvers.method_of_steps_events import Watch
-from fracctl.solvers.method_of_steps_mesh import breaks_of, mesh_of
-from fracctl.solvers.method_of_steps_refinement import (
+from fracctl.solvers.method_of_steps.adaptive import AdaptiveRun
+from fracctl.solvers.method_of_steps.events import Watch
+from fracctl.solvers.method_of_steps.mesh import breaks_of, mesh_of
+from fracctl.solvers.method_of_steps.refinement import (
     for_members,
     halved,
     of_members,
@@ -27,7 +27,7 @@ from fracctl.solvers.method_of_steps_refinement import (
     roughness,
     with_own_steps,
 )
-from fracctl.solvers.method_of_steps_runs import RenewedGain, run
+from fracctl.solvers.method_of_steps.runs import RenewedGain, run
 from fracctl.stepwise import Steps, StepwiseTrajectory
 
 _FEWEST = 4

@@ -25,10 +25,10 @@ from fracctl.characteristic.poles import principal_poles
 from fracctl.errors import ArgumentError, UnsupportedError
 from fracctl.solvers.base import SolvedMembers
 from fracctl.solvers.batched import BatchSolver
-from fracctl.solvers.contour_lanes import LANES
-from fracctl.solvers.contour_loops import loops
-from fracctl.solvers.contour_plan import make_plan
-from fracctl.solvers.contour_response import responses
+from fracctl.solvers.contour.lanes import LANES
+from fracctl.solvers.contour.loops import loops
+from fracctl.solvers.contour.plan import make_plan
+from fracctl.solvers.contour.response import responses
 from fracctl.solvers.members import Members
 from fracctl.solvers.results import packed, without_trajectory
 

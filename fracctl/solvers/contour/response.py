@@ -11,11 +11,11 @@ from collections.abc import Iterator
 import numpy as np
 
 from fracctl.arrays import Array, Booleans, Floats
-from fracctl.solvers.contour_engine import Members, Outputs, respond_blocks
-from fracctl.solvers.contour_lanes import LANES, lanes
-from fracctl.solvers.contour_loops import Loops
-from fracctl.solvers.contour_plan import Plan
-from fracctl.solvers.contour_tables import tables
+from fracctl.solvers.contour.engine import Members, Outputs, respond_blocks
+from fracctl.solvers.contour.lanes import LANES, lanes
+from fracctl.solvers.contour.loops import Loops
+from fracctl.solvers.contour.plan import Plan
+from fracctl.solvers.contour.tables import tables
 from fracctl.solvers.outputs import Values
 
 _AT_ONCE = 384

@@ -15,8 +15,8 @@ from fracctl.arrays import Array, Floats
 from fracctl.characteristic.matrix import CharacteristicMatrix
 from fracctl.fractional.series import Recipe, recursion
 from fracctl.fractional.system import LinearFractionalSystem
-from fracctl.solvers.contour_engine import Wanted
-from fracctl.solvers.contour_fill import TERMS, Matrix, Sums
+from fracctl.solvers.contour.engine import Wanted
+from fracctl.solvers.contour.fill import TERMS, Matrix, Sums
 
 _Power = tuple[Floats, Floats]
 """Coefficient (…, b) or less, and exponent, () or (b,)."""

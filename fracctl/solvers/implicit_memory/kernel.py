@@ -10,7 +10,7 @@ from numba import types
 
 from fracctl.arrays import Array, Floats
 from fracctl.compiling import ACCELERATION, BARE, DEMAND, helper, pointer_with, within
-from fracctl.solvers.implicit_memory_equations import (
+from fracctl.solvers.implicit_memory.equations import (
     CONTROL,
     D_KNOWN,
     D_SHARE,

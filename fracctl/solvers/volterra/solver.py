@@ -23,8 +23,8 @@ from fracctl.solvers.batched import BatchSolver
 from fracctl.solvers.members import Members, whole
 from fracctl.solvers.outputs import Values, values
 from fracctl.solvers.results import packed, without_trajectory
-from fracctl.solvers.volterra_panels import UniformPanels
-from fracctl.solvers.volterra_solution import Solution
+from fracctl.solvers.volterra.panels import UniformPanels
+from fracctl.solvers.volterra.solution import Solution
 
 LARGEST_POWER = 7.0
 """Largest exponent of time that is taken out."""

@@ -14,9 +14,9 @@ import numpy as np
 
 from fracctl.arrays import Array, Booleans, Floats
 from fracctl.compiling import compiled, inlined
-from fracctl.solvers.contour_fill import Matrix, fill
-from fracctl.solvers.contour_lanes import LANES, larger
-from fracctl.solvers.contour_rows import (
+from fracctl.solvers.contour.fill import Matrix, fill
+from fracctl.solvers.contour.lanes import LANES, larger
+from fracctl.solvers.contour.rows import (
     add_shapes,
     combine,
     enlarge,

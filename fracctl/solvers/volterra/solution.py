@@ -10,7 +10,7 @@ from fracctl.characteristic.matrix import CharacteristicMatrix
 from fracctl.fractional.series import PowerSeries
 from fracctl.fractional.system import LinearFractionalSystem
 from fracctl.solvers.blocks import Term, assembled, solve_each, terms_of
-from fracctl.solvers.volterra_panels import UniformPanels
+from fracctl.solvers.volterra.panels import UniformPanels
 
 _SAME = 1e-12
 """Orders that differ by less are one order, rounded differently."""

@@ -11,7 +11,7 @@ import numpy as np
 
 from fracctl.arrays import Array, Complexes, Floats
 from fracctl.panels import Panel, PanelGrid
-from fracctl.solvers.contour_design import ContourShape, design, too_many_oscillations
+from fracctl.solvers.contour.design import ContourShape, design, too_many_oscillations
 from fracctl.solvers.sampling import FIRST_TIME, LOGARITHMIC_NODES, panel_nodes
 
 RATIOS = (3.0, 4.0, 5.0, 6.0, 7.0, 8.0)

@@ -13,9 +13,9 @@ from fracctl.fractional.collocation import chebyshev_nodes, integral_matrix
 from fracctl.panels import Panel, PanelGrid
 from fracctl.plants.capabilities import control_events, members_of
 from fracctl.plants.state import Event, StatePlant
-from fracctl.solvers.explicit_memory_history import History
-from fracctl.solvers.explicit_memory_law import Signals
-from fracctl.solvers.explicit_memory_mesh import crossings
+from fracctl.solvers.explicit_memory.history import History
+from fracctl.solvers.explicit_memory.law import Signals
+from fracctl.solvers.explicit_memory.mesh import crossings
 
 _MOST_ITERATIONS = 60
 _CONVERGED = 1e-3

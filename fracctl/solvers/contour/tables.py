@@ -13,10 +13,10 @@ from scipy.special import rgamma
 from fracctl.arrays import Array, Floats
 from fracctl.fractional.series import Recipe, differentiated
 from fracctl.fractional.terms import powers
-from fracctl.solvers.contour_engine import Start, Windows
-from fracctl.solvers.contour_loops import Loops
-from fracctl.solvers.contour_own import own, own_powers, own_shapes, own_start
-from fracctl.solvers.contour_plan import Plan, last_coefficients
+from fracctl.solvers.contour.engine import Start, Windows
+from fracctl.solvers.contour.loops import Loops
+from fracctl.solvers.contour.own import own, own_powers, own_shapes, own_start
+from fracctl.solvers.contour.plan import Plan, last_coefficients
 
 
 def tables(plan: Plan, loops: Loops, members: Array) -> tuple[Floats, Start, Windows]:

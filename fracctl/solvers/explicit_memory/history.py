@@ -8,7 +8,7 @@ from scipy.special import ive
 from fracctl.arrays import Floats
 from fracctl.fractional.collocation import chebyshev_nodes, integral_matrix
 from fracctl.fractional.sum_of_exponentials import sum_of_exponentials
-from fracctl.solvers.explicit_memory_law import Signals
+from fracctl.solvers.explicit_memory.law import Signals
 
 _LARGE = 1e4
 """Arguments of Bessel functions from which on their finite sums do not cancel."""

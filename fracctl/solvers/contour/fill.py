@@ -16,7 +16,7 @@ import numpy as np
 
 from fracctl.arrays import Array, Booleans, Complexes, Floats
 from fracctl.compiling import helper, inlined
-from fracctl.solvers.contour_lanes import LANES, WIDTH
+from fracctl.solvers.contour.lanes import LANES, WIDTH
 
 TERMS = 3
 """Terms of a sum that are added at once; sums are filled up with zeros to a multiple."""
