@@ -87,7 +87,7 @@ def curves_of(results: Results, selection: Selection, initial_condition: str) ->
 
 
 def _missing(results: Results, selection: Selection, initial_condition: str) -> str:
-    if results.configuration["evaluation"]["type"] == "flight":
+    if "stage" in results.columns:
         cure = "evaluation.samples=1 evaluation.first_sample=NUMBER, or evaluation.noise_samples=1 where it ends before"
         return f"paths are kept of several laws with one flight at the last stage; take {cure}"
     return f"no trajectory of an optimum of {selection.objective} is stored for '{initial_condition}'"

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from fracctl.measures.final_distance import FinalDistance
     from fracctl.measures.final_gains import FinalGains
     from fracctl.measures.first_reversal import FirstReversal
+    from fracctl.measures.floquet_multiplier import FloquetMultiplier
     from fracctl.measures.fuel import DeltaV, PeakForce, PeakThrust, Propellant, StationKeeping
     from fracctl.measures.hold_error import HoldError
     from fracctl.measures.implicit_steps import ImplicitSteps
@@ -56,6 +57,7 @@ __all__ = [
     "FinalDistance",
     "FinalGains",
     "FirstReversal",
+    "FloquetMultiplier",
     "HoldError",
     "ImplicitSteps",
     "LargestMultiplier",
@@ -109,6 +111,7 @@ __getattr__ = loaded_at_first_use(
         "FinalDistance": "final_distance",
         "FinalGains": "final_gains",
         "FirstReversal": "first_reversal",
+        "FloquetMultiplier": "floquet_multiplier",
         "HoldError": "hold_error",
         "ImplicitSteps": "implicit_steps",
         "LargestMultiplier": "largest_multiplier",

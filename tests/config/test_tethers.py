@@ -33,7 +33,7 @@ DRAWN = "evaluation.dispersions.initial_theta"
         (["evaluation.first_sample=-1"], "evaluation.first_sample = -1: must be at least 0"),
         (["measures.overshoot={}"], "measures.overshoot: is made for trajectories of"),
         ([f"+{DRAWN}=[norml,0,1]"], f"{DRAWN} = [norml, 0, 1]: must be one of normal, uniform, choice; did you mean"),
-        ([f"+{DRAWN}=[normal,0]"], f"{DRAWN} = [normal, 0]: must hold 'normal' and 2 numbers"),
+        ([f"+{DRAWN}=[normal,0]"], f"{DRAWN} = [normal, 0]: must hold 'normal' and 2 or 4 numbers"),
         ([f"+{DRAWN}=[normal,0,-1]"], f"{DRAWN} = [normal, 0, -1]: must have a deviation of at least 0"),
         ([f"+{DRAWN}=[uniform,1,0]"], f"{DRAWN} = [uniform, 1, 0]: must have its lowest value first"),
         ([f"+{DRAWN}=[]"], f"{DRAWN} = []: must be a list as [normal, 0.7, 0.02]"),

@@ -69,6 +69,7 @@ OF_EXPERIMENTS = {
 }
 """Options of delayed feedback, tethers and flights, by an experiment that has all else they need."""
 
+SLIDING_MODES = ("fda_smc", "da_smc", "fo_smc_reconstruction")
 COMPANIONS = {
     "plant=hcw": ["controller=pd_alpha_full"],
     "plant=hcw_in_plane": ["controller=pd_alpha_in_plane"],
@@ -98,6 +99,8 @@ COMPANIONS = {
     "evaluation=comparison_in_plane": ["plant=hcw_in_plane", "controller=pd_in_plane", "survey=comparison"],
     "survey=comparison": ["evaluation=comparison"],
     **{option: [f"experiment={name}"] for name, options in OF_EXPERIMENTS.items() for option in options},
+    **{f"controller={law}": ["experiment=tether", "evaluation=memory"] for law in SLIDING_MODES},
+    "figures=tether_spread": ["experiment=tether_monte_carlo"],
     "figures=paper_2_to_5": ["initial_condition=[ic1,ic2,ic3]", "survey=out_of_plane"],
 }
 """What an option needs beside it."""

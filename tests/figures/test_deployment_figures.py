@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -177,12 +178,12 @@ def test_measures_that_vary_without_a_choice(results: dict[str, Results]) -> Non
     assert not {"initial_theta", "disturbance_phase", "error_estimate", "nodes"} & set(table)
 
 
-def test_samples_that_never_settle_are_missing_at_the_top(results: dict[str, Results]) -> None:
-    run = results["tether_monte_carlo"]
-    rows = run.evaluations.copy()
+def test_samples_that_never_settle_are_missing_at_the_top(results: dict[str, Results], tmp_path: Path) -> None:
+    folder = shutil.copytree(results["tether_monte_carlo"].run.path, tmp_path / "run")
+    rows = pd.read_parquet(folder / "evaluations.parquet")
     rows.loc[rows["sample"] == 0, "settling_2_percent_orbits"] = np.inf
-    edited = Results(run.run)
-    edited.__dict__["evaluations"] = rows
+    rows.to_parquet(folder / "evaluations.parquet", write_page_checksum=True)
+    edited = Results(RunDirectory(folder))
     figure, _ = spread.build(edited, select(edited, {"shows": "settling_2_percent_orbits"}))
     assert drawn(figure.axes[0])["FDA-SMC"][-1, 1] == 0.75
 

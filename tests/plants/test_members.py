@@ -17,7 +17,10 @@ FOLLOWERS = [0.01, 0.3, 0.9]
 DRAGGED = PerturbedRelativeMotion(density_kg_m3=1e-11)
 LAW = PDAlpha(0.5 * np.eye(3), np.eye(3), 0.9)
 PLANTS = [
-    (DRAGGED.dispersed_by(FOLLOWERS), [DRAGGED.dispersed_by([c]) for c in FOLLOWERS]),
+    (
+        DRAGGED.dispersed_by(follower_ballistic_m2_kg=FOLLOWERS),
+        [DRAGGED.dispersed_by(follower_ballistic_m2_kg=[c]) for c in FOLLOWERS],
+    ),
     (
         RelativeMotion().dispersed_by([0.0, 0.1, 0.2], [0.0, 40.0, -70.0]),
         [RelativeMotion(None, e, f) for e, f in ((0.0, 0.0), (0.1, 40.0), (0.2, -70.0))],

@@ -79,8 +79,8 @@ def test_a_recorded_memory_goes_on_where_it_was() -> None:
 
 def test_only_integrals_integrate() -> None:
     pid = SampledLaw(PID(1.0, 0.4, 2.0, 0.1), FINE, STEP).discrete(1)
-    assert pid.integrating.tolist() == [True, False]
-    assert not SampledLaw(PDAlpha(1.0, 1.0, 0.5), FINE, STEP).discrete(1).integrating.any()
+    assert pid.integral_of.tolist() == [0, -1]
+    assert (SampledLaw(PDAlpha(1.0, 1.0, 0.5), FINE, STEP).discrete(1).integral_of == -1).all()
 
 
 def test_seconds() -> None:
