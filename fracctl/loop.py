@@ -16,7 +16,7 @@ from fracctl.controllers.saturation import Saturation
 from fracctl.errors import ArgumentError, UnsupportedError
 from fracctl.fractional.system import LinearFractionalSystem
 from fracctl.fractional.terms import FractionalTerm
-from fracctl.plants.capabilities import LimitedPlant, batch_of
+from fracctl.plants.capabilities import LimitedPlant, LinearPeriodicPlant, batch_of
 from fracctl.plants.linear import LinearPlant
 from fracctl.plants.state import StatePlant
 
@@ -82,7 +82,8 @@ class ClosedLoop:
         """What a solver of this loop must be able to do; nothing for the free motion of a linear plant."""
         needs = set()
         if not isinstance(self.plant, LinearPlant):
-            needs.add(Need.PERIODIC_PLANT if getattr(self.plant, "linear", False) else Need.NONLINEAR_PLANT)
+            periodic = isinstance(self.plant, LinearPeriodicPlant)
+            needs.add(Need.PERIODIC_PLANT if periodic else Need.NONLINEAR_PLANT)
         if isinstance(self.controller, DelayedLaw):
             needs.add(Need.DELAYS)
         elif isinstance(self.controller, MemoryLaw):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, Literal, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -21,6 +21,14 @@ class PeriodicPlant(Protocol):
     def period(self) -> float | None:
         """T > 0, None where this one has none."""
         ...
+
+
+@runtime_checkable
+class LinearPeriodicPlant(PeriodicPlant, Protocol):
+    """A plant with a period that is linear in states and controls, though not by constant matrices."""
+
+    linear: Literal[True]
+    """That it is."""
 
 
 @runtime_checkable

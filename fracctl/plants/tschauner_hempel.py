@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 
 from fracctl.arrays import Floats
@@ -26,7 +28,7 @@ class TschaunerHempel(AboutKeplerOrbit):
         ArgumentError: the orbit is not an ellipse, or a number is not finite.
     """
 
-    linear = True
+    linear: Literal[True] = True
     """In states and controls, with coefficients of the orbit's period."""
 
     def rates(self, t: Floats, x: Floats, u: Floats) -> Floats:

@@ -12,6 +12,7 @@ from fracctl.arrays import Array, Booleans, Complexes, Floats
 from fracctl.errors import ArgumentError, UnsupportedError
 from fracctl.fractional.sum_of_exponentials import sum_of_exponentials
 from fracctl.loop import ClosedLoop
+from fracctl.plants.capabilities import period_of
 from fracctl.solvers.explicit_memory.law import signals
 
 _SHORTEST, _LONGEST = 1e-4, 1e3
@@ -93,7 +94,7 @@ def memory_multipliers(
     """
     if loop.batch is not None and member is None:
         raise ArgumentError("loop", f"a batch of {loop.batch}", "must be a single loop", "name one by `member`")
-    found = getattr(loop.plant, "period", None) if period is None else period
+    found = period_of(loop.plant) if period is None else period
     if found is None or not found > 0.0:
         raise ArgumentError("period", found, "must be a positive number, for the plant has none of its own")
     form = _ModeForm(loop, member or 0, float(found), kernel_tolerance)

@@ -12,29 +12,41 @@ from fracctl.controllers import AdaptiveSlidingMode
 from fracctl.controllers.fractional_sliding_mode import FractionalSlidingMode
 from fracctl.design import first_return, lqr, natural_period
 from fracctl.errors import UnsupportedError
-from fracctl.plants import FunctionPlant, HCWInPlane, Libration, PerturbedRelativeMotion, RelativeMotion, Tether
+from fracctl.plants import (
+    FunctionPlant,
+    HCWInPlane,
+    Libration,
+    PerturbedRelativeMotion,
+    RelativeMotion,
+    Tether,
+    TschaunerHempel,
+)
 from fracctl.plants import RotatingEllipsoid as Ellipsoid
 from fracctl.plants import capabilities as known
 
 OWN = FunctionPlant(lambda t, x, u: -x + u, 1, 1)
 OFFERS = {
-    known.PeriodicPlant: (HCWInPlane(), Libration(), RelativeMotion(), PerturbedRelativeMotion(), Tether()),
+    known.PeriodicPlant: (
+        *(HCWInPlane(), Libration(), RelativeMotion(), TschaunerHempel(), PerturbedRelativeMotion(), Tether()),
+    ),
+    known.LinearPeriodicPlant: (TschaunerHempel(),),
     known.SectionedPlant: (Ellipsoid(),),
     known.CompiledPlant: (Tether(),),
     known.LimitedPlant: (Tether(),),
     known.ConstrainedPlant: (Tether(),),
     known.TensionedPlant: (Tether(),),
-    known.DispersedPlant: (RelativeMotion(), PerturbedRelativeMotion(), Tether()),
-    known.OrbitalPlant: (HCWInPlane(), RelativeMotion(), PerturbedRelativeMotion()),
+    known.DispersedPlant: (RelativeMotion(), TschaunerHempel(), PerturbedRelativeMotion(), Tether()),
+    known.OrbitalPlant: (HCWInPlane(), RelativeMotion(), TschaunerHempel(), PerturbedRelativeMotion()),
     known.ChiefPlant: (HCWInPlane(),),
     known.TurningPlant: (PerturbedRelativeMotion(),),
-    known.BatchedPlant: (RelativeMotion(), PerturbedRelativeMotion(), Tether()),
+    known.BatchedPlant: (RelativeMotion(), TschaunerHempel(), PerturbedRelativeMotion(), Tether()),
 }
 
 
 @pytest.mark.parametrize("capability", list(OFFERS), ids=lambda kind: kind.__name__)
 def test_plants_offer_what_they_say(capability: type) -> None:
-    plants = (OWN, HCWInPlane(), Libration(), Ellipsoid(), RelativeMotion(), PerturbedRelativeMotion(), Tether())
+    about_leaders = (RelativeMotion(), TschaunerHempel(), PerturbedRelativeMotion())
+    plants = (OWN, HCWInPlane(), Libration(), Ellipsoid(), *about_leaders, Tether())
     having = {type(plant) for plant in OFFERS[capability]}
     offering = {type(plant) for plant in plants if isinstance(plant, capability)}
     if capability is known.PeriodicPlant:
