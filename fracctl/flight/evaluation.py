@@ -37,9 +37,9 @@ class FlightEvaluation(Evaluation):
 
     A design point has one flight in the stages ``ideal`` and ``sampled``, `noise_samples` in ``noisy`` and
     ``nonlinear``, which differ in their noise, and `samples` in ``dispersed``. Nothing is optimised; the run concludes
-    with what survives. `status` is ``ok``, ``unsettled`` (outside the band by which flights are judged at the horizon),
-    ``unstable`` (the ideal loop is), ``diverged``, or ``failed`` (the law cannot be sampled, or no memory be
-    chosen for a marginal loop).
+    with what survives. Settling times are infinite for bands that were not kept for the last half orbit. `status` is
+    ``ok``, ``unsettled`` (so it is for the band by which flights are judged), ``unstable`` (the ideal loop is),
+    ``diverged``, or ``failed`` (the law cannot be sampled, or no memory be chosen for a marginal loop).
 
     Raises:
         ArgumentError: a stage, a measure or a value of a law is unknown, flights cannot be judged by the band, or the
