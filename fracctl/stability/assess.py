@@ -13,7 +13,6 @@ from fracctl.characteristic.poles import principal_poles
 from fracctl.characteristic.winding import unstable_zeros
 from fracctl.errors import ArgumentError
 from fracctl.loop import ClosedLoop, Need
-from fracctl.stability.modal_floquet import memory_multipliers
 
 ON_THE_AXIS = 1e-9
 """|Re σ|/|σ| of a pole whose side is not decided."""
@@ -63,6 +62,8 @@ def assess(loop: ClosedLoop) -> Verdict:
 
 
 def _periodic(loop: ClosedLoop) -> Verdict:
+    from fracctl.stability.modal_floquet import memory_multipliers  # loads SciPy's linear algebra
+
     plant: Any = loop.plant
     found = memory_multipliers(loop)
     exponents = np.log(found.values[found.isolated & (found.values != 0.0)]) / plant.period
